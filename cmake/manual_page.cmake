@@ -9,6 +9,9 @@ string(REGEX REPLACE "^[.]SH\n[^\n]*" ".SH DESCRIPTION" text "${text}")
 # Names are not hyphenated; long ones may break.
 string(REGEX REPLACE "([a-zA-Z0-9{}][_/]|[a-z0-9]{)([a-zA-Z])" "\\1\\\\:\\2" text "${text}")
 
+# Of four columns the last, which has the sentences, takes the room that there is; equal ones are too narrow for words.
+string(REPLACE " expand allbox;\nlb lb lb lb\nl l l l." " allbox;\nlb lb lb lb\nl l l lx." text "${text}")
+
 set(tools "")
 foreach(page ${TOOLS})
   file(STRINGS ${page} line REGEX "^tunica[^ ]* .*- ")

@@ -39,7 +39,7 @@ from cases import CONTROL, SWITCHES, Refused, find_cases, say, shells_stated_by,
 
 # What each stage leaves beside its report, the file of the chain first.
 PRODUCTS = {"extract": ["surface.ply"], "decimate": ["coarse.ply"], "relax": ["shell.ply", "map.png"],
-            "simulate": ["result.hdf", "picture.png"]}
+            "simulate": ["result.hdf", "result.page", "picture.png"]}
 STAGES = tuple(PRODUCTS)
 MAKEFILE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "Makefile.pipeline")
 TABLES = (".tsv", ".csv", ".txt", ".json", ".xml", ".ctbl", ".label", ".lut")  # of label names, beside a volume

@@ -5,6 +5,7 @@
 #include "tunica/accuracy/estimates.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/core/require.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
@@ -34,14 +35,6 @@ constexpr double largest_field_change = 4;             // estimates: the field's
 constexpr double largest_bend = std::numbers::pi / 6;  // of a shell: strains within it are small below
 /// Mean distance of an extracted surface to the true one, in voxels (docs/tables/staircase.md).
 constexpr double voxels_off = 0.1;
-
-constexpr std::array<std::pair<std::string_view, std::string_view>, 7> names{{{"displacement", "mm"},
-                                                                              {"energy", "mJ"},
-                                                                              {"volume", "mm^3"},
-                                                                              {"stress", "MPa"},
-                                                                              {"membrane", "MPa"},
-                                                                              {"tension", "N/mm"},
-                                                                              {"probe", "mm"}}};
 
 /// What a load presses or a fix holds. It ends where triangles do, on every level within its border: what its part of
 /// the area changed by is left, to first order, and costs an answer about as much.
@@ -300,15 +293,15 @@ private:
     } catch (const RequirementError&) {  // no linear answer
     }
     choices_.push_back({"model", "nonlinear", 0, "linear",
-                        std::isfinite(error) ? fmt::format("an error of {:.2g} %", 100 * error) : "no answer"});
+                        std::isfinite(error) ? fmt::format("an error of {}", percent_text(error)) : "no answer"});
   }
 
   /// Whether the last level is accepted.
   bool judge() {
     const std::size_t n = out_.levels.size();
     if (model_error_ >= request_.within) {
-      out_.reasons = {fmt::format("the shortest time step tried, {:.4g} ms, still changes the answer by {:.2g} %",
-                                  1e3 * std::get<DynamicRun>(settings_.kind).step, 100 * model_error_)};
+      out_.reasons = {fmt::format("the shortest time step tried, {:.4g} ms, still changes the answer by {}",
+                                  1e3 * std::get<DynamicRun>(settings_.kind).step, percent_text(model_error_))};
       return false;
     }
     if (n < fewest_levels) {
@@ -332,9 +325,9 @@ private:
     out_.reasons.clear();
     const double allowed = largest_field_change * std::max(*out_.estimate, request_.within);
     if ((request_.of == Quantity::displacement || request_.of == Quantity::probe) && field_change_ > allowed) {
-      out_.reasons.push_back(fmt::format("the {} changed little, but displacements elsewhere by {:.2g} %",
+      out_.reasons.push_back(fmt::format("the {} changed little, but displacements elsewhere by {}",
                                          request_.of == Quantity::probe ? "probe" : "largest displacement",
-                                         100 * field_change_));
+                                         percent_text(field_change_)));
     }
     // Stresses are those away from such layers, where there is any place away from them.
     if (is_stress(request_.of) &&
@@ -360,9 +353,9 @@ private:
     }
     if (other_state_ >= model_share * request_.within) {
       out_.reasons.push_back(
-          fmt::format("there are several states of rest, {:.2g} % apart: which one the shell comes to "
+          fmt::format("there are several states of rest, {} apart: which one the shell comes to "
                       "depends on what no mesh knows",
-                      100 * other_state_));
+                      percent_text(other_state_)));
     }
     if (const std::size_t bent = count_unresolved(last_->system.model(), last_->at, largest_bend); bent > 0) {
       out_.reasons.push_back(fmt::format("{} shell(s) bend by more than 30 degrees", bent));
@@ -437,7 +430,7 @@ private:
     if (n > 1) {
       const AccuracyLevel& before = out_.levels[n - 2];
       out_.choices.push_back({"shells", chosen, out_.estimate, fmt::format("{} shells", before.shells),
-                              fmt::format("an answer {:.2g} % away", 100 * std::abs(before.value / last.value - 1))});
+                              fmt::format("an answer {} away", percent_text(std::abs(before.value / last.value - 1)))});
     }
     out_.choices.insert(out_.choices.end(), choices_.begin(), choices_.end());
   }
@@ -466,8 +459,10 @@ private:
 
 }  // namespace
 
-std::string_view name_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).first; }
-std::string_view unit_of(Quantity quantity) { return names.at(static_cast<std::size_t>(quantity)).second; }
+std::string_view unit_of(Quantity quantity) {
+  constexpr std::array<std::string_view, 7> units{"mm", "mJ", "mm^3", "MPa", "MPa", "N/mm", "mm"};
+  return units.at(static_cast<std::size_t>(quantity));
+}
 
 Accuracy solve_within(std::vector<ShellBody> bodies, const std::vector<const Target*>& targets,
                       const AccuracyRequest& request, const RunSettings& settings, const ModelOf& model_of,

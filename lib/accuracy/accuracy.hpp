@@ -25,14 +25,21 @@ enum class Quantity {
   tension,       ///< of the largest principal membrane force (Wall::tension_p99)
   probe,         ///< displacement of a node along an axis
 };
+template <>
+inline constexpr auto names_of<Quantity> = std::to_array<Named<Quantity>>({{"displacement", Quantity::displacement},
+                                                                           {"energy", Quantity::energy},
+                                                                           {"volume", Quantity::volume},
+                                                                           {"stress", Quantity::stress},
+                                                                           {"membrane", Quantity::membrane},
+                                                                           {"tension", Quantity::tension},
+                                                                           {"probe", Quantity::probe}});
 
 /// Whether it is one of what the wall bears.
 inline bool is_stress(Quantity quantity) {
   return quantity == Quantity::stress || quantity == Quantity::membrane || quantity == Quantity::tension;
 }
 
-/// "displacement" and so on, as flags and reports name them; mm, mJ, mm^3, MPa or N/mm.
-std::string_view name_of(Quantity quantity);
+/// mm, mJ, mm^3, MPa or N/mm.
 std::string_view unit_of(Quantity quantity);
 
 struct AccuracyRequest {

@@ -3,6 +3,7 @@
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 
@@ -170,7 +171,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   MotionChoice choice{tried[chosen], error_of(chosen), {}};
   const std::size_t other = chosen > 0 ? chosen - 1 : 1;
   choice.choices.push_back({"step", milliseconds(chosen), choice.error, milliseconds(other),
-                            chosen > 0 ? fmt::format("an error of {:.2g} %", 100 * error_of(other))
+                            chosen > 0 ? fmt::format("an error of {}", percent_text(error_of(other)))
                                        : fmt::format("{:.2g} times the time", seconds[1] / seconds[0])});
   if (!may_rest) {
     return choice;
@@ -184,7 +185,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
       const std::string cost = fmt::format("{:.2g} times the time", seconds[chosen] / answer.seconds);
       return {rest, error, {{"run", "static", error, "dynamic", cost}}};
     }
-    choice.choices.push_back({"run", "dynamic", 0, "static", fmt::format("an error of {:.2g} %", 100 * error)});
+    choice.choices.push_back({"run", "dynamic", 0, "static", fmt::format("an error of {}", percent_text(error))});
   } catch (const InputError&) {  // what can move freely has no state of rest
   } catch (const RequirementError&) {
   }

@@ -56,7 +56,7 @@ void PictureFlags::declare(Tool& tool) {
       ->type_name("VALUE");
 }
 
-ResultPictureOptions PictureFlags::options(bool modes) const {
+chain::ResultPictureOptions PictureFlags::options(bool modes) const {
   if (!out) {
     for (const auto& [name, given] :
          {std::pair("--colour", &colour), {"--magnify", &magnify}, {"--picture-range", &range}}) {
@@ -65,7 +65,7 @@ ResultPictureOptions PictureFlags::options(bool modes) const {
       }
     }
   }
-  ResultPictureOptions options;
+  chain::ResultPictureOptions options;
   if (modes) {
     options.colour = Colouring::displacement;
   }

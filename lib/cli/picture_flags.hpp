@@ -1,8 +1,7 @@
-// cli: what every tool's command line shares.
 #pragma once
 
+#include "tunica/chain/result_picture.hpp"
 #include "tunica/cli/tool.hpp"
-#include "tunica/io/result/result_picture.hpp"
 
 #include <optional>
 #include <string>
@@ -19,7 +18,7 @@ struct PictureFlags {
   /// What they ask for. @param modes  the result is modes, which have a shape but no size: the default is then their
   /// displacement, and nothing else is allowed
   /// Errors: UsageError: flags without --picture, a colour that there is not, a factor or range that is none.
-  [[nodiscard]] ResultPictureOptions options(bool modes) const;
+  [[nodiscard]] chain::ResultPictureOptions options(bool modes) const;
 };
 
 }  // namespace tunica::cli

@@ -1,4 +1,3 @@
-// cli: what every tool's command line shares.
 #pragma once
 
 #include <filesystem>

@@ -4,9 +4,11 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/core/spelling.hpp"
+#include "tunica/io/scene/scene_manual.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace tunica::cli {
@@ -20,6 +22,18 @@ std::optional<std::size_t> count_of(const std::optional<std::string>& text, cons
     throw UsageError(fmt::format("{}: '{}' is not a whole number from 1 to {:.0f}", flag, *text, most));
   }
   return truncated<std::size_t>(*value);
+}
+
+std::optional<double> degrees_of(const std::optional<std::string>& text, const char* flag, double least, double most) {
+  if (!text) {
+    return std::nullopt;
+  }
+  const auto number = parse_number(*text);
+  if (!number || !(*number >= least && *number <= most)) {
+    throw UsageError(
+        fmt::format("{}: '{}' is not a number of degrees from {:.0f} to {:.0f}", flag, *text, least, most));
+  }
+  return number;
 }
 
 std::optional<HalfSpaceNodes> parse_half_space(const std::string& text, const char* flag) {
@@ -48,6 +62,9 @@ std::optional<HalfSpaceNodes> parse_half_space(const std::string& text, const ch
 
 namespace {
 
+/// All but a probe's displacement, which only a scene file can ask for.
+constexpr std::span<const Named<Quantity>> answers = std::span(names_of<Quantity>).first<6>();
+
 template <typename Value>
 Value required(const std::optional<Value>& value, const char* flag, const char* example) {
   if (!value) {
@@ -71,7 +88,9 @@ double number(const std::optional<std::string>& text, const char* flag, double o
 Places flags_as_places(std::initializer_list<const char*> keys) {
   Places places{{"command line", true}, {}};
   for (const char* key : keys) {
-    places.keys[key] = {std::string("--") + key, true};
+    std::string flag = std::string("--") + key;
+    std::ranges::replace(flag, '_', '-');
+    places.keys[key] = {flag, true};
   }
   return places;
 }
@@ -127,16 +146,14 @@ void set_kind(const SceneFlags& a, Scene& scene, Ramp& load_ramp) {
 void SceneFlags::declare(Tool& tool) {
   CLI::App& app = tool.arguments();
   tool.group("Wall");
-  tool.quantity("--young", young, dimension::pressure, "Young's modulus, e.g. 1MPa");
-  app.add_option("--poisson", poisson, "Poisson's ratio, in (-1, 0.5)")->type_name("NUMBER");
-  tool.quantity("--thickness", thickness, dimension::length, "thickness of the shell, e.g. 1.5mm");
-  tool.quantity("--density", density, dimension::density, "mass density, e.g. 1100kg/m3 (dynamic runs need it)");
+  tool.quantity("--young", young, dimension::pressure, help_of_key("shell", "young"));
+  app.add_option("--poisson", poisson, help_of_key("shell", "poisson"))->type_name("NUMBER");
+  tool.quantity("--thickness", thickness, dimension::length, help_of_key("shell", "thickness"));
+  tool.quantity("--density", density, dimension::density, help_of_key("shell", "density"));
   tool.group("Load and supports");
-  tool.quantity("--pressure", pressure, dimension::pressure,
-                "pressure that follows the surface; positive pushes along the normals, outward");
+  tool.quantity("--pressure", pressure, dimension::pressure, help_of_key("load", "value"));
   tool.quantity("--imaged-at", imaged_at, dimension::pressure,
-                "the organ was under this pressure when it was imaged: there it is at rest, and its wall bears that "
-                "already. Without --pressure, or with the same, --young can be left out");
+                help_of_key("load", "imaged_at") + ". Without --pressure, or with the same, --young can be left out");
   app.add_option(
          "--fix", fixes,
          "what is held, may repeat: boundary | rims:slide (they widen and turn freely, and stay in their planes) "
@@ -145,33 +162,25 @@ void SceneFlags::declare(Tool& tool) {
       ->expected(1)
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  tool.quantity(
-      "--support", support, dimension::bedding,
-      "stiffness of the tissue around, an elastic bed per area, e.g. 1e5N/m3; without force in the shape given");
+  tool.quantity("--support", support, dimension::bedding, help_of_key("support", "stiffness"));
   tool.group("Run");
   app.add_flag("--static", is_static, "solve for the state of rest");
-  app.add_option("--load-steps", load_steps,
-                 "static: steps in which the load grows, each written (default: all at once)")
-      ->type_name("N");
-  tool.quantity("--duration", duration, dimension::time, "dynamic: time simulated, e.g. 2s");
-  tool.quantity("--step", step, dimension::time, "dynamic: time step, e.g. 40ms");
+  app.add_option("--load-steps", load_steps, help_of_key("run", "load_steps"))->type_name("N");
+  tool.quantity("--duration", duration, dimension::time, help_of_key("run", "duration"));
+  tool.quantity("--step", step, dimension::time, help_of_key("run", "step"));
   tool.quantity("--ramp", ramp, dimension::time, "dynamic: the load grows from zero over this time (default: at once)");
   tool.group("Elements");
-  app.add_option("--membrane", membrane, "membrane element: cst | opt | adapt (default adapt)")->type_name("NAME");
-  app.add_option("--bending", bending,
-                 "bending element: comas (the paper's) | comas-consistent | dkt | dkt-comas (default dkt-comas)")
-      ->type_name("NAME");
+  app.add_option("--membrane", membrane, help_of_key("shell", "membrane"))->type_name("NAME");
+  app.add_option("--bending", bending, help_of_key("shell", "bending"))->type_name("NAME");
   tool.group("Solver");
-  app.add_option("--solver", solver, "cg | direct | auto (default auto)")->type_name("NAME");
-  app.add_option("--cg-tolerance", cg_tolerance, "relative residual at which CG stops, e.g. 5% (the paper's)")
-      ->type_name("PERCENT");
+  app.add_option("--solver", solver, help_of_key("run", "solver"))->type_name("NAME");
+  app.add_option("--cg-tolerance", cg_tolerance, help_of_key("run", "cg_tolerance"))->type_name("PERCENT");
   app.add_option("--cg-iterations", cg_iterations,
                  "at most N CG iterations; without --cg-tolerance a fixed count that asks for no convergence")
       ->type_name("N");
-  app.add_option("--converge", converge, "relative residual at which a step counts as solved (default 1e-8)")
-      ->type_name("NUMBER");
+  app.add_option("--converge", converge, help_of_key("run", "converge"))->type_name("NUMBER");
   tool.group("Output");
-  app.add_option("--every", every, "write every N-th state (default 1); the first and the last always")->type_name("N");
+  app.add_option("--every", every, help_of_key("run", "every"))->type_name("N");
   tool.group("Scene");
   app.add_option("--mesh-unit", mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
       ->type_name("mm|cm|m|um");
@@ -183,14 +192,11 @@ bool SceneFlags::pressure_is_imaged() const {
 
 Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
   Scene scene;
-  SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({})};
-  load.places.keys["imaged_at"] = {"--imaged-at", true};
-  scene.run_places = flags_as_places({"duration", "step", "solver", "converge", "every"});
-  scene.run_places.keys["cg_tolerance"] = {"--cg-tolerance", true};
-  scene.run_places.keys["cg_iterations"] = {"--cg-iterations", true};
+  SceneLoad load{"shell", std::nullopt, PressureLoad{}, {}, flags_as_places({"imaged_at"})};
+  scene.run_places =
+      flags_as_places({"duration", "step", "solver", "converge", "every", "cg_tolerance", "cg_iterations"});
   set_kind(*this, scene, load.ramp);
-  choose<Solver>(solver, "--solver", scene.run.solver,
-                 {{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
+  choose(solver, "--solver", scene.run.solver);
   if (cg_tolerance) {
     scene.run.cg_tolerance = parse_percent(*cg_tolerance);
     scene.cg_tolerance_stated = true;
@@ -220,13 +226,8 @@ Scene SceneFlags::scene(const std::filesystem::path& mesh) const {
     (void)required(density, "--density", "1100kg/m3");
   }
   shell.material.density = density;
-  choose<Membrane>(membrane, "--membrane", shell.membrane,
-                   {{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
-  choose<Bending>(bending, "--bending", shell.bending,
-                  {{"comas", Bending::comas},
-                   {"comas-consistent", Bending::comas_consistent},
-                   {"dkt", Bending::dkt},
-                   {"dkt-comas", Bending::dkt_comas}});
+  choose(membrane, "--membrane", shell.membrane);
+  choose(bending, "--bending", shell.bending);
   scene.shells.push_back(shell);
 
   load.kind = PressureLoad{required(pressure ? pressure : imaged_at, "--pressure", "100mmHg"), true, imaged_at};
@@ -283,8 +284,7 @@ void AccuracyFlags::declare(Tool& tool) {
   app.add_option("--accuracy", within,
                  "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
       ->type_name("PERCENT");
-  app.add_option("--of", of,
-                 "the answer: displacement | energy | volume | membrane | stress | tension (default displacement)")
+  app.add_option("--of", of, fmt::format("the answer: {} (default displacement)", words_of(answers, " | ")))
       ->type_name("NAME");
   app.add_option("--target", target,
                  "the surface that SHELL.ply was fitted to: finer shells are fitted to it too; without --accuracy one "
@@ -319,13 +319,7 @@ void AccuracyFlags::ask(const CLI::App& app, Scene& scene) const {
   asked.places = flags_as_places({"of", "target"});
   asked.places.item.text = "--accuracy";
   asked.within = parse_percent(*within);
-  choose<Quantity>(of, "--of", asked.of,
-                   {{"displacement", Quantity::displacement},
-                    {"energy", Quantity::energy},
-                    {"volume", Quantity::volume},
-                    {"stress", Quantity::stress},
-                    {"membrane", Quantity::membrane},
-                    {"tension", Quantity::tension}});
+  choose(of, "--of", asked.of, answers);
   if (target && !scene.shells.empty()) {  // without one, check_scene() refuses the accuracy
     asked.targets[scene.shells.front().name] = *target;
   }

@@ -4,7 +4,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/io/scene/scene.hpp"
 
-#include <initializer_list>
+#include <algorithm>
+#include <span>
 
 namespace tunica::cli {
 
@@ -53,22 +54,28 @@ std::optional<HalfSpaceNodes> parse_half_space(const std::string& text, const ch
 /// A whole number from 1 to `most`; none where the flag was not given. Errors: UsageError.
 std::optional<std::size_t> count_of(const std::optional<std::string>& text, const char* flag, double most);
 
+/// Degrees in a range; none where the flag was not given. Errors: UsageError.
+std::optional<double> degrees_of(const std::optional<std::string>& text, const char* flag, double least, double most);
+
+/// The words of choices, one after the other.
+template <typename Value>
+std::string words_of(std::span<const Named<Value>> choices, const std::string& between) {
+  std::string words;
+  for (const Named<Value>& named : choices) {
+    words += (words.empty() ? "" : between) + std::string(named.word);
+  }
+  return words;
+}
+
 /// The choice that a word names. Errors: UsageError with all of them.
 template <typename Value>
 void choose(const std::optional<std::string>& word, const char* flag, Value& value,
-            std::initializer_list<std::pair<std::string_view, Value>> choices) {
-  if (!word) {
-    return;
+            std::span<const Named<Value>> choices = names_of<Value>) {
+  const auto found = std::ranges::find(choices, word.value_or(""), &Named<Value>::word);
+  if (word && found == choices.end()) {
+    throw UsageError(flag + (": '" + *word) + "' is not one of " + words_of(choices, ", "));
   }
-  std::string known;
-  for (const auto& [name, meaning] : choices) {
-    if (*word == name) {
-      value = meaning;
-      return;
-    }
-    known += (known.empty() ? "" : ", ") + std::string(name);
-  }
-  throw UsageError(flag + (": '" + *word) + "' is not one of " + known);
+  value = word ? found->value : value;
 }
 
 }  // namespace tunica::cli

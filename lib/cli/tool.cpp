@@ -263,6 +263,17 @@ CLI::Option* Tool::tolerance(const std::string& name, std::optional<LengthTolera
   return app_.add_option(name, *text, help)->type_name("TOLERANCE");
 }
 
+void Tool::mesh_unit(std::optional<double>& unit_mm) {
+  auto text = std::make_shared<std::optional<std::string>>();
+  after_parse_.emplace_back([text, &unit_mm] {
+    if (*text) {
+      unit_mm = parse_length_unit(**text);
+    }
+  });
+  app_.add_option("--mesh-unit", *text, "unit of mesh files that do not state one: mm, cm, m or um")
+      ->type_name("mm|cm|m|um");
+}
+
 void Tool::parse_common() {
   std::size_t count = 0;
   if (threads_) {
@@ -510,7 +521,7 @@ int Tool::finish(ExitCode code, const std::string& error) {
   if (!report_.empty()) {
     try {
       const std::lock_guard guard(recording_);
-      write_report(message.empty(), message, result_);
+      write_report(message.empty(), message, make_result_ ? make_result_() : result_);
     } catch (const std::exception& failure) {
       say_line(fmt::format("tunica-{}: {}\n", verb_, one_line(failure.what())));
       code = code == ExitCode::ok ? ExitCode::output : code;
@@ -708,6 +719,24 @@ Progress Tool::progress(const std::string& doing) {
       say_line(fmt::format("tunica-{}: {} {:.1f} %\n", verb_, doing, percent));
     }
   };
+}
+
+chain::Context Tool::context() {
+  return {.progress = [this](const std::string& doing) { return progress(doing); },
+          .stage = [this](const std::string& name) { return std::make_shared<Stage>(*this, name); },
+          .note = [this](const std::string& text) { note(text); },
+          .detail = [this](const std::string& text) { detail(text); },
+          .warn = [this](const Warning& warning) { warn(warning); },
+          .reads = [this](const std::filesystem::path& path) { input(path); },
+          .has_read = [this] { require_unchanged_inputs(); },
+          .writes = [this](const std::filesystem::path& path,
+                           const std::vector<std::string>& endings) { output(path, endings); },
+          .wrote = [this](const std::filesystem::path& path) { wrote(path); },
+          .name_of = [this](const std::filesystem::path& path) { return provenance_.name_of(path); },
+          .command = [this] { return provenance_.lasting_command(); },
+          .redact = [this](const std::string& text) { return provenance_.redact(text); },
+          .made_by = [this] { return made_by(); },
+          .overwrite = force_};
 }
 
 void Tool::say_line(const std::string& text) const { say((std::exchange(bar_open_, false) ? "\n" : "") + text); }

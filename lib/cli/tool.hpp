@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/chain/context.hpp"
 #include "tunica/cli/memory_limit.hpp"
 #include "tunica/cli/provenance.hpp"
 #include "tunica/core/clock.hpp"
@@ -66,6 +67,9 @@ public:
   /// Declares `name` as a length tolerance ("0.5%" or "0.2mm").
   CLI::Option* tolerance(const std::string& name, std::optional<LengthTolerance>& value, const std::string& help);
 
+  /// Declares --mesh-unit; after parsing `unit_mm` holds the unit's size in mm.
+  void mesh_unit(std::optional<double>& unit_mm);
+
   /// Parses, runs `body`, writes the report, prints one line on an error. @return the exit code for main().
   int run(int argc, char** argv, const std::function<void()>& body);
 
@@ -115,8 +119,14 @@ public:
   /// What was asked for on standard output. Errors: OutputError when it is lost, UsageError when the report goes there.
   void print(const std::string& text) const;
 
+  /// This tool as whom a stage of the chain tells how it goes. It lives as long as the tool.
+  [[nodiscard]] chain::Context context();
+
   /// The `result` object of the report. A value that is undefined is set to null (`Json()`).
   [[nodiscard]] Json& result() { return result_; }
+
+  /// Makes `result` in the end, however the run ends, of what outlives the run.
+  void result_by(std::function<Json()> make) { make_result_ = std::move(make); }
 
   /// The `stated` object of the report: what the user said of the organ, as numbers. Null: nothing was stated.
   [[nodiscard]] Json& stated() { return stated_; }
@@ -188,6 +198,7 @@ private:
   std::vector<std::filesystem::path> outputs_;
   Json seconds_ = Json::object();
   Json result_ = Json::object();
+  std::function<Json()> make_result_;  ///< in place of it
   Json stated_;
   std::vector<std::function<void()>> after_parse_;
   std::filesystem::file_time_type start_on_disk_;

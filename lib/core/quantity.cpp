@@ -165,6 +165,11 @@ double parse_percent(std::string_view text) {
   return *value / 100;
 }
 
+std::string percent_text(double part) {
+  constexpr double two_digits = 0.995;
+  return std::abs(part) < two_digits ? fmt::format("{:.2g} %", 100 * part) : fmt::format("{:.0f} %", 100 * part);
+}
+
 std::optional<double> parse_number(std::string_view text) {
   const auto value = take_number(text);
   return value && text.empty() ? value : std::nullopt;

@@ -54,6 +54,9 @@ LengthTolerance parse_length_tolerance(std::string_view text);
 /// Reads a fraction written as percent, "5%" gives 0.05. Errors: UsageError.
 double parse_percent(std::string_view text);
 
+/// A part with two digits as percent, above 100 % with all of them: .0123 gives "1.2 %", 12.3 "1230 %".
+std::string percent_text(double part);
+
 /// Reads a plain decimal number (C notation, finite) that must fill the whole text.
 std::optional<double> parse_number(std::string_view text);
 

@@ -40,6 +40,17 @@ struct PictureOptions {
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options);
 
+/// surface_picture() of a surface that is moved, its edges drawn dark, with the outline of the reference where it
+/// differs visibly. The caption says how many times as large displacements are drawn. Errors: InputError
+/// as surface_picture(), and not one displacement per vertex, an edge without vertices, a magnification that is none.
+/// @param displacement  #V, mm
+/// @param edges         vertices at both ends
+/// @param magnify       > 0: displacements are drawn that many times as large
+/// @param look          the rest: lines, outline and caption are set here
+std::string moved_picture(const TriangleMesh& reference, const std::vector<Vec3>& displacement,
+                          const std::vector<std::array<std::size_t, 2>>& edges, const std::vector<double>& values,
+                          double magnify, PictureOptions look);
+
 /// To the right, upward, and towards the viewer of the first of surface_picture()'s two views, of points in mm, at
 /// least one: unit vectors. Errors: InputError: none, or one that is not finite.
 std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points);

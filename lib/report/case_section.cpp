@@ -1,4 +1,5 @@
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/quantity.hpp"
 #include "tunica/draw/picture.hpp"
 #include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/measures.hpp"
@@ -22,7 +23,7 @@ std::string text_at(const PipelineCase& one, const std::string& stage, const std
 Markup next_lines(const CaseReport& one) {
   Markup lines;
   for (const NextStep& next : next_steps(one)) {
-    lines += html("<p class=\"next\">{}: <code>{}</code></p>\n", next.what, next.command);
+    lines += part("next_step", {{"what", next.what}, {"command", next.command}});
   }
   return lines;
 }
@@ -31,32 +32,31 @@ Markup verdict(const CaseReport& one) {
   const PipelineCase& source = one.source;
   const std::string status = status_of(one);
   if (is_inaccurate(source)) {
-    Markup line = html(
-        "<p class=\"verdict failed\"><strong>Accuracy not reached</strong>: {}. Why: {}. The numbers below are those "
-        "that "
-        "were reached.</p>\n",
-        one.redacted(accuracy_reached(source)->text()), why_inaccurate(one));
+    Markup line = part("verdict_inaccurate",
+                       {{"reached", one.redacted(accuracy_reached(source)->text())}, {"why", why_inaccurate(one)}});
     return line += next_lines(one);
   }
   if (status == "failed") {
-    Markup line =
-        html("<p class=\"verdict failed\"><strong>Failed</strong> at {}{}: {}</p>\n",
-             source.stage == "none" ? "the start" : source.stage, told_exit(source), one.redacted(source.message));
+    Markup line = part("verdict_failed", {{"stage", source.stage == "none" ? "the start" : source.stage},
+                                          {"exit", told_exit(source)},
+                                          {"message", one.redacted(source.message)}});
     return line += next_lines(one);
   }
   const std::string warnings = one.warnings.empty()       ? "no warning"
                                : one.warnings.size() == 1 ? "1 warning"
                                                           : fmt::format("{} warnings", one.warnings.size());
   const bool converged = source.at("simulate", "result.converged") == true;
-  return html("<p class=\"verdict {}\"><strong>{}</strong>, {}.</p>\n", status,
-              converged ? "Done and converged" : "Done", warnings);
+  return part("verdict",
+              {{"status", status}, {"done", converged ? "Done and converged" : "Done"}, {"warnings", warnings}});
 }
 
 Markup big_number(const char* key, const std::string& label, const CaseReport& one, const std::string& aside) {
   const Measure& what = measure(key);
   const auto value = what.value(one.source);
-  return html("<div><dt>{}</dt><dd><b>{}</b> {}<small>{}</small></dd></div>\n", label, value ? what.text(*value) : "–",
-              value ? what.unit : "", aside);
+  return part("big_number", {{"label", label},
+                             {"value", value ? what.text(*value) : "–"},
+                             {"unit", value ? what.unit : ""},
+                             {"aside", aside}});
 }
 
 // Whether shells were fitted to the surface half of a wall away.
@@ -96,7 +96,7 @@ Markup three_numbers(const CaseReport& one) {
   const std::string whence = is_unloaded(one)      ? ", from the shape without load"
                              : is_prestressed(one) ? ", from the image on, which shows the wall under pressure"
                                                    : "";
-  Markup list = html("<dl class=\"three\">\n");
+  Markup list;
   const std::string at_faces = maximum ? plus_minus(one, "stress_error_percent", "stress_p99_mpa") +
                                              "von Mises, at either face; largest " + figure(*maximum) + " kPa"
                                        : "not computed";
@@ -122,7 +122,7 @@ Markup three_numbers(const CaseReport& one) {
                  percent ? "certified, both ways; " + measure("distance_percent").text(*percent) +
                                " % of the organ's diagonal; of the shape, not of stress"
                          : "not certified");
-  return list += html("</dl>\n");
+  return part("three_numbers", {{"numbers", list}});
 }
 
 // What is known of the error that the shells' number makes in the answer.
@@ -132,28 +132,21 @@ Markup discretisation(const CaseReport& one) {
   }
   const auto reached = accuracy_reached(one.source);
   if (!reached && measure("stress_error_percent").value(one.source)) {
-    return html(
-        "<p>How far stress and displacement depend on the number of shells is estimated from a finer solution, beside "
-        "each number.</p>\n");
+    return part("error_beside");
   }
   if (!reached) {
-    if (is_fitted_to_middle(one) || is_unloaded(one)) {
-      return html(
-          "<p>How far stress and displacement depend on the number of shells was not estimated: a second run with other"
-          " <code>--shells</code> (<code>SHELLS</code> in the pipeline) shows it.</p>\n");
-    }
-    return html(
-        "<p>How far stress and displacement depend on the number of shells was not estimated: <code>--accuracy</code> "
-        "(<code>ACCURACY=5% OF=membrane</code> in the pipeline) does that.</p>\n");
+    return part(is_fitted_to_middle(one) || is_unloaded(one) ? "error_by_second_run" : "error_by_accuracy");
   }
   const std::string of = one.redacted(reached->of);
   const bool credible = one.source.at("simulate", "result.accuracy.credible") == true;
   if (!reached->percent) {
-    return html("<p>The error of the {} by number of shells and model was not estimated.</p>\n", of);
+    return part("error_unknown", {{"of", of}});
   }
-  return html("<p>The error of the {} by number of shells and model is {} {} % ({} % were asked for){}.</p>\n", of,
-              credible ? "credibly below" : "estimated at", figure_above(*reached->percent), figure(reached->asked),
-              credible ? "" : ", which is not credible");
+  return part("error_of_accuracy", {{"of", of},
+                                    {"how", credible ? "credibly below" : "estimated at"},
+                                    {"percent", figure_above(*reached->percent)},
+                                    {"asked", figure(reached->asked)},
+                                    {"doubt", credible ? "" : ", which is not credible"}});
 }
 
 // The colour bar, whose texts the page's script changes with the colours.
@@ -165,19 +158,17 @@ Markup legend(const CaseReport& one) {
   const auto colours = surface_colours();
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const auto [red, green, blue] = colours[i];
-    stops += html("<stop offset=\"{}\" stop-color=\"{}\"/>", fmt::format("{:.4g}", real(i) / real(colours.size() - 1)),
-                  fmt::format("#{:02x}{:02x}{:02x}", red, green, blue));
+    stops += part("stop", {{"offset", fmt::format("{:.4g}", real(i) / real(colours.size() - 1))},
+                           {"colour", fmt::format("#{:02x}{:02x}{:02x}", red, green, blue)}});
   }
   const bool loaded = one.picture_top > 0;
-  return html(
-      "<div class=\"legend\"><span class=\"quantity\">{0}</span><span class=\"scale\"{5}><span>0</span>"
-      "<svg viewBox=\"0 0 160 10\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><defs><linearGradient "
-      "id=\"bar-{1}\">{2}</linearGradient></defs><rect width=\"160\" height=\"10\" rx=\"2\" "
-      "fill=\"url(#bar-{1})\"/></svg><span class=\"top\">{3}</span></span><span class=\"drawn\">{4}</span></div>\n",
-      loaded ? "Membrane stress (von Mises)" : "Shells", one.id(), stops,
-      loaded ? figure(one.picture_top * 1e3) + " kPa" : "",
-      loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification)) : "Drawn as imaged.",
-      loaded ? Markup{} : Markup{" hidden"});
+  return part("legend", {{"quantity", loaded ? "Membrane stress (von Mises)" : "Shells"},
+                         {"hidden", Markup{loaded ? "" : " hidden"}},
+                         {"id", one.id()},
+                         {"stops", stops},
+                         {"top", loaded ? figure(one.picture_top * 1e3) + " kPa" : ""},
+                         {"drawn", loaded ? fmt::format("Loaded; displacement drawn × {}.", figure(one.magnification))
+                                          : "Drawn as imaged."}});
 }
 
 Markup organ_figure(const CaseReport& one, int level) {
@@ -187,13 +178,12 @@ Markup organ_figure(const CaseReport& one, int level) {
   Markup made = heading(level, "The organ");
   const std::string what =
       one.picture_top > 0 ? "The loaded organ, coloured by the membrane stress of its wall" : "The organ as imaged";
-  made += html("<figure class=\"organ\"{}>\n<div class=\"stage\"><img src=\"{}\" alt=\"{}\"></div>\n",
-               one.organ.empty() ? Markup{} : html(" data-organ=\"{}-data\"", one.id()),
-               data_address("image/png", one.picture), what);
-  made += legend(one);
-  made += html("<p class=\"note\" role=\"status\"></p>\n</figure>\n");
+  const Markup data = one.organ.empty() ? Markup{} : part("organ_attribute", {{"id", one.id()}});
+  made += part(
+      "organ",
+      {{"data", data}, {"picture", data_address("image/png", one.picture)}, {"what", what}, {"legend", legend(one)}});
   if (!one.organ.empty()) {
-    made += html("<script type=\"text/plain\" id=\"{}-data\">{}</script>\n", one.id(), one.organ);
+    made += part("organ_data", {{"id", one.id()}, {"bytes", one.organ}});
   }
   return made;
 }
@@ -203,12 +193,7 @@ Markup slices_figure(const CaseReport& one, int level) {
     return {};
   }
   Markup made = heading(level, "Shells on the image");
-  return made += html(
-             "<figure class=\"slices\"><img src=\"{}\" alt=\"Nine slices of the image with the outline of the "
-             "shells\"><figcaption>Blue: the segmented organ; amber: the shells. Rows: axial, coronal, sagittal; "
-             "columns: at a quarter, half and three quarters of the organ. The patient's left is on the right, "
-             "the front on top or on the left.</figcaption></figure>\n",
-             data_address("image/png", one.slices));
+  return made += part("slices", {{"picture", data_address("image/png", one.slices)}});
 }
 
 struct Line {
@@ -222,9 +207,9 @@ Markup table_of(const std::string& caption, const std::vector<Line>& lines) {
   }
   Markup rows;
   for (const Line& line : lines) {
-    rows += html("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", line.head, line.value);
+    rows += part("fact", {{"head", line.head}, {"value", line.value}});
   }
-  return html("<table class=\"facts\"><caption>{}</caption><tbody>\n{}</tbody></table>\n", caption, rows);
+  return part("facts", {{"caption", caption}, {"rows", rows}});
 }
 
 // Values of a cohort's columns; what is not known has no line.
@@ -346,44 +331,36 @@ Markup costs(const CaseReport& one) {
     const Json memory = one.source.at(stage, "peak_mib");
     const Json threads = one.source.at(stage, "threads");
     if (seconds.is_number()) {
-      rows += html("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>\n", stage,
-                   figure(seconds.get<double>()), memory.is_number() ? figure(memory.get<double>()) : "–",
-                   threads.is_number() ? figure(threads.get<double>()) : "–");
+      rows += part("cost", {{"stage", stage},
+                            {"seconds", figure(seconds.get<double>())},
+                            {"memory", memory.is_number() ? figure(memory.get<double>()) : "–"},
+                            {"threads", threads.is_number() ? figure(threads.get<double>()) : "–"}});
     }
   }
-  return rows.text.empty() ? Markup{}
-                           : html(
-                                 "<table class=\"facts grid\"><caption>Time and memory</caption><thead><tr><th "
-                                 "scope=\"col\">Stage</th><th scope=\"col\">s</th><th scope=\"col\">MiB</th><th "
-                                 "scope=\"col\">Threads</th></tr></thead><tbody>\n{}</tbody></table>\n",
-                                 rows);
+  return rows.text.empty() ? Markup{} : part("costs", {{"rows", rows}});
 }
 
 Markup warnings_section(const CaseReport& one, int level) {
   if (one.warnings.empty()) {
     return {};
   }
-  Markup made = heading(level, "Warnings");
-  made += html("<ul class=\"warnings\">\n");
+  Markup items;
   for (const ToldWarning& told : one.warnings) {
-    made += html("<li>{}<small>{}{}</small>: {}</li>\n",
-                 told.warning.kind.empty() ? Markup{} : html("<b>{}</b> ", told.warning.kind), told.stage,
-                 told.warning.weight == Weight::major ? ", serious" : "", told.warning.text);
+    const std::string& kind = told.warning.kind;
+    items += part("warning", {{"kind", kind.empty() ? Markup{} : part("warning_kind", {{"kind", kind}})},
+                              {"stage", told.stage},
+                              {"serious", told.warning.weight == Weight::major ? ", serious" : ""},
+                              {"text", told.warning.text}});
   }
-  return made += html("</ul>\n");
+  return heading(level, "Warnings") += part("list", {{"class", "warnings"}, {"items", items}});
 }
 
 Markup list_section(const std::string& title, const std::vector<std::string>& texts, int level) {
-  Markup made;
-  if (!texts.empty()) {
-    made += heading(level, title);
-    made += html("<ul class=\"warnings\">\n");
-    for (const std::string& text : texts) {
-      made += html("<li>{}</li>\n", text);
-    }
-    made += html("</ul>\n");
+  Markup items;
+  for (const std::string& text : texts) {
+    items += part("item", {{"text", text}});
   }
-  return made;
+  return texts.empty() ? Markup{} : heading(level, title) += part("list", {{"class", "warnings"}, {"items", items}});
 }
 
 Markup files(const CaseReport& one, int level, bool paths) {
@@ -394,21 +371,18 @@ Markup files(const CaseReport& one, int level, bool paths) {
         if (path.empty()) {
           continue;
         }
-        rows += html("<tr><th scope=\"row\">{} {}</th><td>{}</td><td><code>{}</code></td></tr>\n", stage,
-                     std::string(kind) == "inputs" ? "read" : "wrote",
-                     paths ? path.string() : one.redacted(path.string()), hash.empty() ? "–" : hash);
+        rows += part("file", {{"stage", stage},
+                              {"did", std::string(kind) == "inputs" ? "read" : "wrote"},
+                              {"path", paths ? path.string() : one.redacted(path.string())},
+                              {"hash", hash.empty() ? "–" : hash}});
       }
     }
   }
   if (rows.text.empty()) {
     return {};
   }
-  return heading(level, "Files") += html(
-             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Files of {}\"><table "
-             "class=\"facts grid files\"><caption>What each stage read and wrote</caption><thead><tr><th "
-             "scope=\"col\">Stage</th><th scope=\"col\">File</th><th scope=\"col\">SHA-256</th></tr></thead><tbody>\n"
-             "{}</tbody></table></div>\n",
-             one.name, rows);
+  return heading(level, "Files") +=
+         part("scroll", {{"name", "Files of " + one.name}, {"table", part("files", {{"rows", rows}})}});
 }
 
 Markup commands(const CaseReport& one, int level) {
@@ -422,8 +396,7 @@ Markup commands(const CaseReport& one, int level) {
   if (lines.empty()) {
     return {};
   }
-  return heading(level, "Commands") +=
-         html("<p>tunica {}.</p>\n<pre tabindex=\"0\"><code>{}</code></pre>\n", version, lines);
+  return heading(level, "Commands") += part("commands", {{"version", version}, {"commands", lines}});
 }
 
 }  // namespace
@@ -506,22 +479,24 @@ std::vector<NextStep> next_steps(const CaseReport& one) {
 }
 
 Markup case_section(const CaseReport& one, int level, bool paths) {
-  Markup made = verdict(one);
-  made += three_numbers(one);
-  made += discretisation(one);
-  made += warnings_section(one, level);
-  made += list_section("Outputs that are not what the reports say", one.different, level);
-  made += organ_figure(one, level);
-  made += slices_figure(one, level);
-  made += list_section("Not drawn", one.missing, level);
-  made += list_section("Notes", one.notes, level);
-  made += heading(level, "Numbers");
-  made +=
-      html("<div class=\"tables\">\n{}{}{}{}</div>\n", geometry_and_mesh(one), mechanics(one), inputs(one), costs(one));
-  made += files(one, level, paths);
-  made += commands(one, level);
-  made += methods_section(one, level);
-  return made;
+  Markup tables = geometry_and_mesh(one);
+  tables += mechanics(one);
+  tables += inputs(one);
+  tables += costs(one);
+  return part("case", {{"verdict", verdict(one)},
+                       {"numbers", three_numbers(one)},
+                       {"discretisation", discretisation(one)},
+                       {"warnings", warnings_section(one, level)},
+                       {"different", list_section("Outputs that are not what the reports say", one.different, level)},
+                       {"organ", organ_figure(one, level)},
+                       {"slices", slices_figure(one, level)},
+                       {"missing", list_section("Not drawn", one.missing, level)},
+                       {"notes", list_section("Notes", one.notes, level)},
+                       {"numbers_head", heading(level, "Numbers")},
+                       {"tables", tables},
+                       {"files", files(one, level, paths)},
+                       {"commands", commands(one, level)},
+                       {"methods", methods_section(one, level)}});
 }
 
 }  // namespace tunica::report

@@ -27,18 +27,19 @@ constexpr std::array shown_keys{"volume_ml",
                                 "thickness_mm",
                                 "seconds"};
 
-Markup link_to(const CaseReport& one) { return html("<a href=\"#{}\"><bdi>{}</bdi></a>", one.id(), one.name); }
+Markup link_to(const CaseReport& one) { return part("link", {{"id", one.id()}, {"name", one.name}}); }
 
 Markup counts(const std::vector<CaseReport>& cases) {
   const auto count = [&](const char* status) {
     return std::ranges::count_if(cases, [&](const CaseReport& one) { return status_of(one) == status; });
   };
-  return html(
-      "<dl class=\"counts\"><div class=\"{}\"><dt>Done, no warning</dt><dd>{}</dd></div>"
-      "<div class=\"{}\"><dt>Failed</dt><dd>{}</dd></div><div class=\"{}\"><dt>Done, with "
-      "warnings</dt><dd>{}</dd></div></dl>\n",
-      count("done") > 0 ? "done" : "none", count("done"), count("failed") > 0 ? "failed" : "none", count("failed"),
-      count("warned") > 0 ? "warned" : "none", count("warned"));
+  const auto class_of = [&](const char* status) { return count(status) > 0 ? status : "none"; };
+  return part("counts", {{"done_class", class_of("done")},
+                         {"done", count("done")},
+                         {"failed_class", class_of("failed")},
+                         {"failed", count("failed")},
+                         {"warned_class", class_of("warned")},
+                         {"warned", count("warned")}});
 }
 
 Markup failures(const std::vector<CaseReport>& cases) {
@@ -49,15 +50,19 @@ Markup failures(const std::vector<CaseReport>& cases) {
     }
     Markup steps;
     for (const NextStep& next : next_steps(one)) {
-      steps += html("<br>{}: <code>{}</code>", next.what, next.command);
+      steps += part("failure_step", {{"what", next.what}, {"command", next.command}});
     }
     const std::string why = is_inaccurate(one.source)
                                 ? one.redacted(accuracy_reached(one.source)->text()) + ": " + why_inaccurate(one)
                                 : one.redacted(one.source.message);
-    items += html("<li>{}: {}{}: {}{}</li>\n", link_to(one),
-                  one.source.stage == "none" ? "not begun" : one.source.stage, told_exit(one.source), why, steps);
+    items += part("failure", {{"link", link_to(one)},
+                              {"stage", one.source.stage == "none" ? "not begun" : one.source.stage},
+                              {"exit", told_exit(one.source)},
+                              {"why", why},
+                              {"steps", steps}});
   }
-  return items.text.empty() ? Markup{} : heading(2, "Failures") += html("<ul class=\"failures\">\n{}</ul>\n", items);
+  return items.text.empty() ? Markup{}
+                            : heading(2, "Failures") += part("list", {{"class", "failures"}, {"items", items}});
 }
 
 // Which kinds of warnings there are, of how many cases, with an example.
@@ -67,19 +72,18 @@ Markup warnings_table(const std::vector<CaseReport>& cases) {
   Markup rows;
   for (const WarningKind& kind : kinds_of(warnings)) {
     const CaseReport& first = cases[kind.cases.front()];
-    rows += html("<tr><th scope=\"row\">{}{}</th><td class=\"number\">{}</td><td>{}: {}: {}</td></tr>\n",
-                 shown_kind(kind.kind), kind.weight == Weight::major ? " (serious)" : "", kind.cases.size(),
-                 link_to(first), kind.example.stage, kind.example.warning.text);
+    rows += part("kind", {{"kind", shown_kind(kind.kind)},
+                          {"serious", kind.weight == Weight::major ? " (serious)" : ""},
+                          {"cases", kind.cases.size()},
+                          {"link", link_to(first)},
+                          {"stage", kind.example.stage},
+                          {"text", kind.example.warning.text}});
   }
   if (rows.text.empty()) {
     return {};
   }
-  return heading(2, "Warnings by kind") += html(
-             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Warnings by kind\"><table "
-             "class=\"facts grid kinds\"><caption>The heaviest first; each case counts once for a kind</caption>"
-             "<thead><tr><th scope=\"col\">Kind</th><th scope=\"col\">Cases</th><th scope=\"col\">Example</th></tr>"
-             "</thead><tbody>\n{}</tbody></table></div>\n",
-             rows);
+  return heading(2, "Warnings by kind") +=
+         part("scroll", {{"name", "Warnings by kind"}, {"table", part("kinds", {{"rows", rows}})}});
 }
 
 // Measures that some case knows.
@@ -95,19 +99,17 @@ std::vector<const char*> known_keys(const std::vector<CaseReport>& cases) {
 
 Markup row_of(const CaseReport& one, const std::vector<const char*>& keys) {
   const std::string status = status_of(one);
-  Markup row = html("<tr class=\"{}\"><td class=\"thumb\">{}</td><th scope=\"row\">{}</th><td>{}</td>", status,
-                    one.picture.empty()
-                        ? Markup{}
-                        : html("<img src=\"{}\" alt=\"\" loading=\"lazy\">", data_address("image/png", one.picture)),
-                    link_to(one), status);
+  const Markup thumbnail =
+      one.picture.empty() ? Markup{} : part("thumbnail", {{"picture", data_address("image/png", one.picture)}});
+  Markup cells;
   for (const char* key : keys) {
     const Measure& what = measure(key);
     const auto value = what.value(one.source);
     const bool none = !value || (std::string_view(key) == "seconds" && *value == 0);
-    row += html("<td class=\"number\" data-value=\"{}\">{}</td>", none ? "" : fmt::format("{:.9g}", *value),
-                none ? "–" : what.text(*value));
+    cells += part("cell",
+                  {{"number", none ? "" : fmt::format("{:.9g}", *value)}, {"shown", none ? "–" : what.text(*value)}});
   }
-  return row += html("</tr>\n");
+  return part("row", {{"status", status}, {"thumbnail", thumbnail}, {"link", link_to(one)}, {"cells", cells}});
 }
 
 // What the colours of the pictures mean, label by label.
@@ -123,36 +125,27 @@ Markup scale_note(const std::vector<CaseReport>& cases) {
     text += fmt::format("{}{}0 to {} kPa", text.empty() ? "" : "; ", organs.size() > 1 ? one->organ_name + ": " : "",
                         figure(one->picture_top * 1e3));
   }
-  return text.empty() ? Markup{}
-                      : html(
-                            "<p class=\"more\">Pictures of one label share one scale of stress, up to the largest 99th "
-                            "percentile among them: {}. What is above has the last colour.</p>\n",
-                            text);
+  return text.empty() ? Markup{} : part("scale", {{"ranges", text}});
 }
 
 Markup table(const std::vector<CaseReport>& cases, const std::string& tsv) {
-  Markup heads = html(
-      "<th scope=\"col\"><span class=\"hidden\">Picture</span></th><th scope=\"col\">Case</th><th "
-      "scope=\"col\">Status</th>");
+  Markup columns;
   const std::vector<const char*> keys = known_keys(cases);
   for (const char* key : keys) {
     const Measure& what = measure(key);
-    heads += html("<th scope=\"col\" title=\"{}\">{}{}</th>", what.description, what.title,
-                  what.unit.empty() ? Markup{} : html(" <small>{}</small>", what.unit));
+    columns += part("column", {{"description", what.description},
+                               {"title", what.title},
+                               {"unit", what.unit.empty() ? Markup{} : part("column_unit", {{"unit", what.unit}})}});
   }
   Markup rows;
   for (const CaseReport& one : cases) {
     rows += row_of(one, keys);
   }
   Markup made = heading(2, "Cases");
-  made += html(
-      "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table of the cases\"><table "
-      "class=\"cohort sortable\"><caption class=\"hidden\">Cases and their measures</caption><thead><tr>{}</tr></thead>"
-      "<tbody>\n{}</tbody></table></div>\n",
-      heads, rows);
+  made += part("scroll", {{"name", "Table of the cases"},
+                          {"table", part("cohort_table", {{"columns", columns}, {"rows", rows}})}});
   made += scale_note(cases);
-  return made += html("<p class=\"more\"><a download=\"cohort.tsv\" href=\"{}\">The whole table as TSV</a></p>\n",
-                      data_address("text/tab-separated-values", tsv));
+  return made += part("table_as_file", {{"address", data_address("text/tab-separated-values", tsv)}});
 }
 
 using CaseGroup = std::vector<const CaseReport*>;
@@ -175,15 +168,19 @@ Markup spread_of(const CaseGroup& cases) {
     }
     strips += strip_plot(what, marks);
     for (const Outlier& outlier : found) {
-      items += html("<li>{}: {} {} {} (robust z {})</li>\n", link_to(*cases[outlier.index]), what.title,
-                    what.text(*values[outlier.index]), what.unit, fmt::format("{:+.1f}", outlier.z));
+      items += part("outlier", {{"link", link_to(*cases[outlier.index])},
+                                {"title", what.title},
+                                {"value", what.text(*values[outlier.index])},
+                                {"unit", what.unit},
+                                {"z", fmt::format("{:+.1f}", outlier.z)}});
     }
   }
   if (cases.size() < fewest_compared) {
-    return html("<p>Too few cases to tell outliers.</p>\n");
+    return part("paragraph", {{"text", "Too few cases to tell outliers."}});
   }
-  Markup made = items.text.empty() ? html("<p>No outlier.</p>\n") : html("<ul class=\"outliers\">\n{}</ul>\n", items);
-  return made += html("<div class=\"strips\">\n{}</div>\n", strips);
+  Markup made = items.text.empty() ? part("paragraph", {{"text", "No outlier."}})
+                                   : part("list", {{"class", "outliers"}, {"items", items}});
+  return made += part("strips", {{"strips", strips}});
 }
 
 Markup spread(const std::vector<CaseReport>& cases) {
@@ -194,10 +191,7 @@ Markup spread(const std::vector<CaseReport>& cases) {
     }
   }
   Markup made = heading(2, "Spread and outliers");
-  made += html(
-      "<p>An outlier is farther from the median than 3.5 robust standard deviations (by the median absolute "
-      "deviation, taken as 1 % of the median at least), among at least five cases of a label that are done. Volumes "
-      "whose file names come back from folder to folder are compared name by name.</p>\n");
+  made += part("outlier_rule");
   for (const auto& [organ, group] : organs) {
     if (organs.size() > 1) {
       made += heading(3, group.front()->organ_name);

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <type_traits>
 
 namespace tunica::report {
 namespace {
@@ -35,15 +35,6 @@ Cut cut_into(int level) {
     cut.places.push_back({static_cast<int>(std::lround(b.x() * level)), static_cast<int>(std::lround(b.y() * level))});
   }
   return cut;
-}
-
-// The pieces of a result's shells along an edge; none where the shells are not all cut alike.
-std::optional<int> level_of(const DrawnResult& result) {
-  const std::size_t triangles = result.reference.triangles.size();
-  const double pieces = result.shells > 0 ? real(triangles) / real(result.shells) : 0;
-  const int level = static_cast<int>(std::lround(std::sqrt(pieces)));
-  const bool alike = level >= 1 && level <= 64 && narrow<std::size_t>(level * level) * result.shells == triangles;
-  return alike ? std::optional(level) : std::nullopt;
 }
 
 // For each lattice point of the coarser cut, the one of the finer cut at the same place.
@@ -100,43 +91,46 @@ std::vector<Index> drop_unused(TriangleMesh& mesh, std::vector<std::array<Index,
   return before;
 }
 
-// The shells cut into fewer pieces, by taking points away.
-DrawnShells with_pieces(const DrawnResult& result, int level, int pieces) {
-  const Cut fine = cut_into(level);
-  const Cut coarse = cut_into(pieces);
-  const std::vector<std::size_t> shared = shared_points(coarse, fine, level / pieces);
+// Cuts the shells into fewer pieces, by taking points away, and finds their edges.
+void cut_into_pieces(DrawnShells& drawn, std::size_t pieces) {
+  const Cut fine = cut_into(narrow<int>(drawn.pieces));
+  const Cut coarse = cut_into(narrow<int>(pieces));
+  const std::vector<std::size_t> shared = shared_points(coarse, fine, narrow<int>(drawn.pieces / pieces));
   const std::vector<std::array<Index, 2>> rim = rim_of(coarse);
-  DrawnShells drawn;
-  drawn.mesh.vertices = result.reference.vertices;
+  std::vector<std::array<Index, 3>> triangles;
   std::vector<Index> point(fine.places.size());
-  for (std::size_t shell = 0; shell < result.shells; ++shell) {
+  for (std::size_t shell = 0; shell < drawn.shells; ++shell) {
     for (std::size_t i = 0; i < fine.triangles.size(); ++i) {
-      const auto& corners = result.reference.triangles[shell * fine.triangles.size() + i];
+      const auto& corners = drawn.reference.triangles[shell * fine.triangles.size() + i];
       for (std::size_t k = 0; k < 3; ++k) {
         point[fine.triangles[i][k]] = corners[k];
       }
     }
     for (const auto& [a, b, c] : coarse.triangles) {
-      drawn.mesh.triangles.push_back({point[shared[a]], point[shared[b]], point[shared[c]]});
+      triangles.push_back({point[shared[a]], point[shared[b]], point[shared[c]]});
     }
     for (const auto& [a, b] : rim) {
       const auto ends = std::minmax(point[shared[a]], point[shared[b]]);
       drawn.edges.push_back({ends.first, ends.second});
     }
   }
+  drawn.reference.triangles = std::move(triangles);
   std::ranges::sort(drawn.edges);
   drawn.edges.erase(std::unique(drawn.edges.begin(), drawn.edges.end()), drawn.edges.end());
-  const std::vector<Index> before = drop_unused(drawn.mesh, drawn.edges);
-  for (const DrawnResult::State& state : result.states) {
-    DrawnResult::State& kept = drawn.states.emplace_back();
-    kept.of_solids = state.of_solids;
+  const std::vector<Index> before = drop_unused(drawn.reference, drawn.edges);
+  const auto keep = [&](auto& values) {
+    std::remove_reference_t<decltype(values)> kept;
     for (const Index v : before) {
-      kept.displacement.push_back(state.displacement[v]);
-      kept.membrane.push_back(state.membrane[v]);
-      kept.von_mises.push_back(state.von_mises[v]);
+      kept.push_back(values[v]);
     }
+    values = std::move(kept);
+  };
+  for (DrawnResult::State& state : drawn.states) {
+    keep(state.displacement);
+    keep(state.membrane);
+    keep(state.von_mises);
   }
-  return drawn;
+  drawn.pieces = pieces;
 }
 
 /// Where a coarser mesh of a surface has its vertices, and what the surface has there.
@@ -175,14 +169,14 @@ private:
 };
 
 void decimate_shells(DrawnShells& shells, std::size_t triangles) {
-  const Coarser coarse(shells.mesh, triangles);
+  const Coarser coarse(shells.reference, triangles);
   for (DrawnResult::State& state : shells.states) {
     state.displacement = coarse.values(state.displacement);
     state.membrane = coarse.values(state.membrane);
     state.von_mises = coarse.values(state.von_mises);
   }
   shells.edges.clear();
-  shells.mesh = coarse.mesh();
+  shells.reference = coarse.mesh();
 }
 
 void decimate_solids(DrawnShells& shells, std::size_t triangles) {
@@ -210,6 +204,8 @@ std::string label_of(const DrawnResult& result, const DrawnResult::State& state)
   }
 }
 
+}  // namespace
+
 std::vector<std::string> labels_of(const DrawnResult& result) {
   std::vector<std::string> labels;
   for (const DrawnResult::State& state : result.states) {
@@ -217,8 +213,6 @@ std::vector<std::string> labels_of(const DrawnResult& result) {
   }
   return labels;
 }
-
-}  // namespace
 
 TriangleMesh thinned(const TriangleMesh& mesh, std::size_t triangles) {
   if (mesh.triangles.size() <= triangles) {
@@ -231,47 +225,19 @@ TriangleMesh thinned(const TriangleMesh& mesh, std::size_t triangles) {
 }
 
 DrawnShells thinned(DrawnResult result, std::size_t triangles) {
-  const std::vector<std::string> labels = labels_of(result);
-  const bool is_unloaded = result.is_unloaded;
-  TriangleMesh solids = std::move(result.solids);
-  DrawnShells drawn;
-  if (const auto level = level_of(result)) {
-    int pieces = *level;
-    while (pieces > 1 && (*level % pieces != 0 || narrow<std::size_t>(pieces * pieces) * result.shells > triangles)) {
-      --pieces;
-    }
-    drawn = with_pieces(result, *level, pieces);
-  } else {
-    drawn.mesh = std::move(result.reference);
-    drawn.states = std::move(result.states);
+  DrawnShells drawn{std::move(result), {}, {}};
+  std::size_t pieces = drawn.pieces;
+  while (pieces > 1 && (drawn.pieces % pieces != 0 || pieces * pieces * drawn.shells > triangles)) {
+    --pieces;
   }
-  drawn.labels = labels;
-  drawn.is_unloaded = is_unloaded;
-  drawn.solids = std::move(solids);
-  if (drawn.mesh.triangles.size() > triangles) {
+  cut_into_pieces(drawn, pieces);
+  if (drawn.reference.triangles.size() > triangles) {
     decimate_shells(drawn, triangles);
   }
   if (drawn.solids.triangles.size() > triangles) {
     decimate_solids(drawn, triangles);
   }
   return drawn;
-}
-
-DrawnShells with_fewer_states(DrawnShells shells, std::size_t most) {
-  const std::size_t there = shells.states.size();
-  if (there <= most) {
-    return shells;
-  }
-  std::vector<DrawnResult::State> states;
-  std::vector<std::string> labels;
-  for (std::size_t i = 0; i < most; ++i) {
-    const std::size_t kept = i * (there - 1) / (most - 1);
-    states.push_back(std::move(shells.states[kept]));
-    labels.push_back(std::move(shells.labels[kept]));
-  }
-  shells.states = std::move(states);
-  shells.labels = std::move(labels);
-  return shells;
 }
 
 }  // namespace tunica::report

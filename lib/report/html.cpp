@@ -1,16 +1,18 @@
 #include "tunica/report/detail/html.hpp"
 
+#include "tunica/core/error.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/core/rounding.hpp"
 #include "tunica/io/file/encoding.hpp"
+#include "tunica/report/detail/embedded.hpp"
 
-#include <fmt/args.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 
 namespace tunica::report {
 namespace {
@@ -45,6 +47,23 @@ bool unwanted(std::uint32_t code) {
   return (code < 0x20 && code != '\t' && code != '\n') || (code >= 0x7f && code < 0xa0) || code == 0x061c ||
          (code >= 0x200b && code <= 0x200f) || (code >= 0x2028 && code <= 0x202e) ||
          (code >= 0x2066 && code <= 0x2069) || code == 0xfeff || (code & 0xfffeU) == 0xfffe;
+}
+
+// The parts of the page by their names: what stands behind "<!-- part: NAME -->" and the end of its line, without the
+// last end of a line.
+std::map<std::string_view, std::string_view> find_parts(std::string_view text) {
+  constexpr std::string_view mark = "<!-- part: ";
+  constexpr std::string_view end_of_mark = " -->\n";
+  std::map<std::string_view, std::string_view> parts;
+  for (std::size_t at = text.find(mark); at != std::string_view::npos;) {
+    const std::size_t end = text.find(end_of_mark, at);
+    const std::size_t begin = end + end_of_mark.size();
+    const std::size_t next = text.find(mark, begin);
+    const std::string_view name = text.substr(at + mark.size(), end - at - mark.size());
+    parts[name] = text.substr(begin, std::min(next, text.size()) - begin - 1);
+    at = next;
+  }
+  return parts;
 }
 
 }  // namespace
@@ -95,18 +114,29 @@ std::string escaped(std::string_view text) {
   return safe;
 }
 
-Markup filled(std::string_view format, const std::vector<std::string>& shielded_texts) {
-  fmt::dynamic_format_arg_store<fmt::format_context> store;
-  for (const std::string& text : shielded_texts) {
-    store.push_back(text);
+Markup part(std::string_view name, const std::vector<Slot>& slots) {
+  static const std::map<std::string_view, std::string_view> parts = find_parts(embedded::report_html());
+  std::string_view rest = parts.at(name);
+  Markup made;
+  std::size_t filled = 0;
+  for (std::size_t open = rest.find('{'); open != std::string_view::npos; open = rest.find('{')) {
+    const std::size_t close = rest.find('}', open);
+    const auto slot = std::ranges::find(slots, rest.substr(open + 1, close - open - 1), &Slot::name);
+    TUNICA_ASSERT(slot != slots.end());
+    filled |= std::size_t{1} << (slot - slots.begin());
+    made.text += rest.substr(0, open);
+    made.text += slot->shielded;
+    rest = rest.substr(close + 1);
   }
-  return {fmt::vformat(format, store)};
+  TUNICA_ASSERT(filled + 1 == std::size_t{1} << slots.size());
+  made.text += rest;
+  return made;
 }
 
-Markup heading(int level, std::string_view text) { return html("<h{0}>{1}</h{0}>\n", level, text); }
+Markup heading(int level, std::string_view text) { return part("heading", {{"level", level}, {"text", text}}); }
 
 Markup data_address(std::string_view kind, std::string_view bytes) {
-  return html("data:{};base64,{}", kind, base64(bytes));
+  return part("picture_data", {{"kind", kind}, {"bytes", base64(bytes)}});
 }
 
 std::string figure(double value) {

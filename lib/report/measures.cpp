@@ -2,8 +2,6 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/core/quantity.hpp"
-#include "tunica/report/detail/command_words.hpp"
 #include "tunica/report/detail/html.hpp"
 
 #include <fmt/format.h>
@@ -21,8 +19,8 @@ std::optional<double> number(const Json& value) {
 }
 
 // A key of a stage's report.
-Value reported(const char* stage, const char* key, double scale = 1) {
-  return [=](const PipelineCase& one) {
+Value reported(const char* stage, std::string key, double scale = 1) {
+  return [stage, key = std::move(key), scale](const PipelineCase& one) {
     const auto value = number(one.at(stage, key));
     return value ? std::optional(*value * scale) : std::nullopt;
   };
@@ -47,51 +45,41 @@ Value estimated(const char* of, const char* key) {
   };
 }
 
-// An input as it was written, where that is known; of tools that told no `stated` the command says it.
-std::optional<std::string> written(const PipelineCase& one, const StatedInput& input) {
-  Json typed = one.at("simulate", "stated.typed." + input.key);
+// An input as it was written; null where that is not known.
+Json typed(const PipelineCase& one, const std::string& key) {
+  const Json text = one.at("simulate", "stated.typed." + key);
   // A pressure left out is that of the image.
-  if (input.key == "pressure" && typed.is_null() &&
-      one.at("simulate", "stated.pressure_mpa") == one.at("simulate", "stated.imaged_at_mpa")) {
-    typed = one.at("simulate", "stated.typed.imaged_at");
-  }
-  if (typed.is_string()) {
-    return typed.get<std::string>();
-  }
-  std::string flag = "--" + input.key;
-  std::ranges::replace(flag, '_', '-');
-  return flag_value(words_of(one, "simulate"), flag);
+  const bool is_of_image = key == "pressure" && text.is_null() &&
+                           one.at("simulate", "stated.pressure_mpa") == one.at("simulate", "stated.imaged_at_mpa");
+  return is_of_image ? one.at("simulate", "stated.typed.imaged_at") : text;
 }
 
-std::optional<double> quantity(const std::optional<std::string>& text, Dimension dimension) {
-  try {
-    return text ? std::optional(parse_quantity(*text, dimension)) : std::nullopt;
-  } catch (const UsageError&) {
-    return std::nullopt;
+// "120mmHg" as "120 mmHg"; empty where there is no number with a unit.
+std::string with_blank_before_unit(const std::string& text) {
+  // What follows the number, its exponent too, is the unit.
+  constexpr const char* of_numbers = "+-.0123456789 ";
+  std::size_t end = text.find_first_not_of(of_numbers);
+  if (end != std::string::npos && end > 0 && (text[end] == 'e' || text[end] == 'E')) {
+    end = text.find_first_not_of(of_numbers, end + 1);
   }
+  if (end == std::string::npos || end == 0) {
+    return {};
+  }
+  return text.substr(0, text.find_last_not_of(' ', end - 1) + 1) + " " + text.substr(end);
 }
 
-// An input as a number. @param key  in the report's `stated`, @param scale  of that to the column's unit, @param
-// of_typed of tunica's unit to it, where it is another
-Measure stated(Measure column, const char* key, const StatedInput& input, double scale = 1,
-               std::optional<double> of_typed = std::nullopt) {
-  column.source = fmt::format("simulate: stated.{}; of older tools the command", key);
+// An input as a number. @param key  in the report's `stated`, @param input  in its `typed`, @param scale  of that to
+// the column's unit
+Measure stated(Measure column, const std::string& key, const char* input, double scale = 1) {
+  column.source = "simulate: stated." + key;
   column.input = input;
-  column.value = [=, place = fmt::format("stated.{}", key)](const PipelineCase& one) -> std::optional<double> {
-    const auto value = number(one.at("simulate", place));
-    const auto typed = value ? std::nullopt : quantity(written(one, input), input.dimension);
-    return value   ? std::optional(*value * scale)
-           : typed ? std::optional(*typed * of_typed.value_or(scale))
-                   : std::nullopt;
-  };
+  column.value = reported("simulate", "stated." + key, scale);
   return column;
 }
 
 std::optional<double> shells(const PipelineCase& one) {
   return number(one.at(is_refitted(one) ? "simulate" : "relax", "result.shells"));
 }
-
-constexpr double kg_per_m3 = 1e12;  // in a tonne / mm^3
 
 // Of the shells that carry the load: those that relax left, or finer ones that an accuracy asked for.
 Value of_shells(const std::string& key) {
@@ -209,18 +197,18 @@ std::vector<Measure> make_mechanics() {
       {"volume_change_percent", "Volume change", "%", "Change of the volume that a closed organ encloses.",
        "simulate: result.volume_after_mm3 / result.volume_before_mm3 - 1", true, volume_change},
       stated({"pressure_kpa", "Pressure", "kPa", "Pressure on the wall, as stated.", "", false, {}}, "pressure_mpa",
-             {"pressure", dimension::pressure}, 1e3),
+             "pressure", 1e3),
       stated(
           {"imaged_at_kpa", "Imaged at", "kPa", "Pressure under which the organ was imaged, as stated.", "", false, {}},
-          "imaged_at_mpa", {"imaged_at", dimension::pressure}, 1e3),
+          "imaged_at_mpa", "imaged_at", 1e3),
       stated({"thickness_mm", "Thickness", "mm", "Thickness of the wall, as stated.", "", false, {}}, "thickness_mm",
-             {"thickness", dimension::length}),
+             "thickness"),
       stated({"young_mpa", "Young's modulus", "MPa", "Young's modulus of the wall, as stated.", "", false, {}},
-             "young_mpa", {"young", dimension::pressure}),
+             "young_mpa", "young"),
       stated({"poisson", "Poisson's ratio", "", "Poisson's ratio of the wall, as stated.", "", false, {}}, "poisson",
-             {"poisson", dimension::number}),
+             "poisson"),
       stated({"density_kg_per_m3", "Density", "kg/m3", "Density of the wall, as stated.", "", false, {}},
-             "density_kg_per_m3", {"density", dimension::density}, 1, kg_per_m3),
+             "density_kg_per_m3", "density"),
       {"seconds", "Time", "s", "Seconds of all stages.", "all stages: seconds.total", false, seconds},
       {"peak_mib", "Memory", "MiB", "Largest memory that a stage had in use.", "all stages: peak_mib", false, memory}};
 }
@@ -253,17 +241,11 @@ std::string shown(const PipelineCase& one, const std::string& key) {
     return {};
   }
   const std::string own = what.text(*value) + (what.unit.empty() || what.unit == "%" ? "" : " ") + what.unit;
-  const auto text = what.input ? written(one, *what.input) : std::nullopt;
-  if (what.unit.empty() || !quantity(text, what.input ? what.input->dimension : Dimension())) {
+  const Json text = what.input.empty() ? Json() : typed(one, what.input);
+  const std::string said = text.is_string() ? with_blank_before_unit(text.get<std::string>()) : "";
+  if (what.unit.empty() || said.empty()) {
     return own;
   }
-  // What follows the number, its exponent too, is the unit.
-  std::size_t end = text->find_first_not_of("+-.0123456789 ");
-  if ((*text)[end] == 'e' || (*text)[end] == 'E') {
-    end = text->find_first_not_of("+-.0123456789 ", end + 1);
-  }
-  const std::size_t last = text->find_last_not_of(' ', end - 1);
-  const std::string said = text->substr(0, last + 1) + " " + text->substr(end);
   return said.ends_with(" " + what.unit) ? said : fmt::format("{} ({})", said, own);
 }
 

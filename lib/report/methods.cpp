@@ -40,9 +40,9 @@ public:
         "Methods Eng. 15, 1980."};
     Markup items;
     for (const Work work : cited_) {
-      items += html("<li>{}</li>\n", texts[work]);
+      items += part("item", {{"text", texts[work]}});
     }
-    return html("<ol class=\"references\">\n{}</ol>\n", items);
+    return items;
   }
 
 private:
@@ -149,11 +149,6 @@ std::string support_words(const CaseReport& one) {
       held.push_back(fix.get<std::string>());
     }
   }
-  if (held.empty()) {
-    if (const auto flag = flag_value(words_of(one.source, "simulate"), "--fix")) {
-      held.push_back(*flag);
-    }
-  }
   for (std::string& what : held) {
     what = what == "boundary"        ? "the nodes of its boundary"
            : what == "rigid-motions" ? "only its six rigid motions"
@@ -186,9 +181,7 @@ std::string load_sentence(const CaseReport& one) {
   text += young.empty() ? "" : " (Young's modulus " + young + ", Poisson's ratio " + shown(one.source, "poisson") + ")";
   const std::string thickness = shown(one.source, "thickness_mm");
   text += thickness.empty() ? ". " : " and " + thickness + " thick. ";
-  // Reports of older tools tell no inputs, but the scene does.
-  const std::string said = shown(one.source, "imaged_at_kpa");
-  const std::string imaged = said.empty() ? setting(one, "imaged_at") : said;
+  const std::string imaged = shown(one.source, "imaged_at_kpa");
   text += imaged.empty() || measure("imaged_at_kpa").value(one.source) == 0 ? "The image was taken as unloaded. "
           : setting(one, "unload") == "true"
               ? "The image was taken under a pressure of " + imaged + "; the shape without it was found first. "
@@ -227,8 +220,7 @@ Markup methods_section(const CaseReport& one, int level) {
   text += shown(one.source, "stress_p99_kpa").empty() ? "" : element_sentence(one, works);
   text += load_sentence(one);
   Markup made = heading(level, "Methods, to paste");
-  made += html("<p class=\"methods\">{}</p>\n", one.redacted(text));
-  return made += works.list();
+  return made += part("methods", {{"text", one.redacted(text)}, {"references", works.list()}});
 }
 
 }  // namespace tunica::report

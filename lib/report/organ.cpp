@@ -22,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t bytes_of_states = 12'000'000;  // of all cases together, before they are packed
 constexpr std::size_t bytes_of_point = 8;  // shells: displacement and stresses; of solids without the stresses
 
 struct Box {
@@ -126,13 +125,13 @@ Json list_of(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Tops& tops, double magnification) {
   Box box;
-  box.add(shells.mesh.vertices);
+  box.add(shells.reference.vertices);
   box.add(surface.vertices);
   box.add(shells.solids.vertices);
-  const auto [right, up, towards] = picture_axes(shells.mesh.vertices);
+  const auto [right, up, towards] = picture_axes(shells.reference.vertices);
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
-  for (const std::vector<Vec3>* points : {&shells.mesh.vertices, &shells.solids.vertices}) {
+  for (const std::vector<Vec3>* points : {&shells.reference.vertices, &shells.solids.vertices}) {
     for (const Vec3& p : *points) {
       const Vec3 seen(right.dot(p), up.dot(p), towards.dot(p));
       lower = lower.cwiseMin(seen);
@@ -143,9 +142,9 @@ Json header_of(const DrawnShells& shells, const TriangleMesh& surface, const Top
   const bool moves = tops.displacement > 0;
   const bool measured = !shells.distance.empty();
   Json header{
-      {"shell", {{"points", shells.mesh.vertices.size()}, {"triangles", shells.mesh.triangles.size()}}},
+      {"shell", {{"points", shells.reference.vertices.size()}, {"triangles", shells.reference.triangles.size()}}},
       {"edges", shells.edges.size()},
-      {"states", shells.labels},
+      {"states", labels_of(shells)},
       {"origin", list_of(box.lower)},
       {"size", box.size()},
       {"displacement", tops.component},
@@ -192,9 +191,9 @@ std::string packed(const DrawnShells& shells, const TriangleMesh& surface, const
   const auto place = [&](double value, Eigen::Index k) {
     return 65535 * (value - origin.at(narrow<std::size_t>(k)).get<double>()) / size;
   };
-  const std::size_t points = shells.mesh.vertices.size();
-  pack_vectors(bytes, shells.mesh.vertices, place);
-  pack_indices(bytes, shells.mesh.triangles, points);
+  const std::size_t points = shells.reference.vertices.size();
+  pack_vectors(bytes, shells.reference.vertices, place);
+  pack_indices(bytes, shells.reference.triangles, points);
   pack_indices(bytes, shells.edges, points);
   if (!shells.distance.empty()) {
     pack_levels(bytes, shells.distance, largest(shells.distance));
@@ -249,6 +248,7 @@ DrawnResult unloaded(const fs::path& path) {
   DrawnResult drawn;
   drawn.reference = tessellate_uniformly(shell, pieces).mesh;
   drawn.shells = shell.triangles.size();
+  drawn.pieces = pieces;
   const std::size_t points = drawn.reference.vertices.size();
   DrawnResult::State& rest = drawn.states.emplace_back();
   rest.displacement.assign(points, Vec3::Zero());
@@ -257,26 +257,35 @@ DrawnResult unloaded(const fs::path& path) {
   return drawn;
 }
 
+// Of a result without the page's data, as older tools left it.
+std::string untold_result(const CaseReport& one) {
+  const Json command = one.source.at("simulate", "command");
+  const std::string said = command.is_string() ? command.get<std::string>() : "tunica-simulate";
+  const bool forced = (said + " ").find(" --force ") != std::string::npos;
+  return one.redacted("result.page is missing, as in results of older versions: the loaded organ is not drawn; " +
+                      said + (forced ? "" : " --force") + " draws it");
+}
+
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
                  bool loaded) {
   // Without its load the organ is not where it was imaged.
   if (surface && !shells.is_unloaded) {
     const ClosestPoint tree(*surface);
-    for (const Vec3& p : shells.mesh.vertices) {
+    for (const Vec3& p : shells.reference.vertices) {
       shells.distance.push_back(std::sqrt(tree.closest(p).squared_distance));
     }
   }
   const Tops tops = tops_of(shells, loaded);
   Box box;
-  box.add(shells.mesh.vertices);
+  box.add(shells.reference.vertices);
   one.magnification = magnification_for(tops.displacement, (box.upper - box.lower).norm());
   one.picture_top = tops.membrane.value_or(0);
-  TriangleMesh seen = shells.mesh;
+  TriangleMesh seen = shells.reference;
   for (std::size_t v = 0; v < seen.vertices.size(); ++v) {
     seen.vertices[v] += one.magnification * shells.states.back().displacement[v];
   }
   // As it stands in 3-D, which is decided by the shape without load.
-  one.seen = {std::move(seen), {}, picture_axes(shells.mesh.vertices)};
+  one.seen = {std::move(seen), {}, picture_axes(shells.reference.vertices)};
   if (loaded) {
     one.seen.stress = shells.states.back().membrane;
   }
@@ -296,9 +305,9 @@ void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const st
 Room room_for(std::size_t cases) {
   const std::size_t count = std::max<std::size_t>(cases, 1);
   Room room;
-  room.triangles = std::clamp<std::size_t>(600'000 / count, 1'000, 60'000);
-  room.states = std::clamp<std::size_t>(4000 / count, 2, 41);
-  room.bytes = bytes_of_states / count;
+  room.triangles = std::clamp<std::size_t>(600'000 / count, 1'000, most_page_triangles);
+  room.states = std::clamp<std::size_t>(4000 / count, 2, most_page_states);
+  room.bytes = most_page_bytes / count;
   room.picture_longest = count == 1 ? 1080 : count <= 12 ? 720 : count <= 60 ? 400 : 160;
   room.slice = count == 1 ? 220 : count <= 12 ? 150 : count <= 60 ? 100 : 60;
   return room;
@@ -307,9 +316,10 @@ Room room_for(std::size_t cases) {
 void draw_organ(CaseReport& one, const Room& room) {
   const auto surface = attempt(one, "surface.ply", [](const fs::path& path) { return read_mesh(path).mesh; });
   const bool simulated = one.source.at("simulate", "ok") == true;
-  auto result =
-      simulated ? attempt(one, "result.hdf", [&](const fs::path& path) { return read_drawn_result(path, room.states); })
-                : std::nullopt;
+  auto result = simulated ? attempt(one, "result.page", read_page_file) : std::nullopt;
+  if (simulated && !is_there(one.source.folder / "result.page")) {
+    one.missing.push_back(untold_result(one));
+  }
   const bool loaded = result.has_value();
   if (!loaded) {
     result = attempt(one, "shell.ply", unloaded);
@@ -318,9 +328,11 @@ void draw_organ(CaseReport& one, const Room& room) {
     one.scene = one.redacted(result->scene);
     try {
       DrawnShells shells = thinned(std::move(*result), room.triangles);
-      const std::size_t of_state = bytes_of_point * (shells.mesh.vertices.size() + shells.solids.vertices.size());
-      const std::size_t states = std::max<std::size_t>(2, room.bytes / std::max<std::size_t>(of_state, 1));
-      draw_shells(one, room, with_fewer_states(std::move(shells), states), surface, loaded);
+      const std::size_t of_state = bytes_of_point * (shells.reference.vertices.size() + shells.solids.vertices.size());
+      const std::size_t states =
+          std::clamp<std::size_t>(room.bytes / std::max<std::size_t>(of_state, 1), 2, room.states);
+      shells.states = evenly_chosen(std::move(shells.states), states);
+      draw_shells(one, room, std::move(shells), surface, loaded);
     } catch (const InputError& error) {
       one.missing.push_back(one.redacted(error.what()));
     }

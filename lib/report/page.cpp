@@ -68,64 +68,37 @@ CaseReport report_of(PipelineCase source, std::size_t number, const CaseFolders&
   return one;
 }
 
-Markup policy() {
-  return html(
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src &#39;none&#39;; script-src "
-      "&#39;sha256-{}&#39;; style-src &#39;sha256-{}&#39;; img-src data:; base-uri &#39;none&#39;; form-action "
-      "&#39;none&#39;\">\n",
-      sha256_base64(embedded::report_js()), sha256_base64(embedded::report_css()));
-}
-
-Markup head(const std::string& title) {
-  Markup made = html("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-  made += policy();
-  made += html(
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" "
-      "content=\"light dark\">\n<meta name=\"referrer\" content=\"no-referrer\">\n<meta name=\"generator\" "
-      "content=\"tunica {}\">\n<title>{} – tunica report</title>\n",
-      version, title);
-  made += {"<style>" + std::string(embedded::report_css()) + "</style>\n</head>\n"};
-  return made;
-}
-
-Markup footer(const std::string& command) {
-  Markup made = html(
-      "<footer>\n<p><strong>Not a medical device.</strong> For research only. The wall is linear elastic and as thick "
-      "as "
-      "stated; without a pressure at which it was taken the image shows it unloaded.</p>\n<p>Made by "
-      "tunica {} (GPL-3.0-or-later)",
-      version);
-  made += command.empty() ? html(".</p>\n") : html(": <code>{}</code></p>\n", command);
-  made += html(
-      "<details><summary>Licences of what this page carries</summary><pre "
-      "tabindex=\"0\">{}</pre></details>\n</footer>\n",
-      embedded::LICENCES_txt());
-  return made;
-}
-
-Markup body(const std::vector<CaseReport>& cases, const std::string& tsv, const std::string& command, bool paths) {
-  Markup made;
+Markup main_of(const std::vector<CaseReport>& cases, const std::string& tsv, bool paths) {
   if (cases.size() == 1) {
-    made += html("<body>\n<header><p class=\"brand\">tunica report</p><h1><bdi>{}</bdi></h1></header>\n<main>\n",
-                 cases[0].name);
-    made += case_section(cases[0], 2, paths);
-  } else {
-    made +=
-        html("<body class=\"many\">\n<header><p class=\"brand\">tunica report</p><h1>{} cases</h1></header>\n<main>\n",
-             cases.size());
-    made += cohort_section(cases, tsv);
-    made += heading(2, "Case by case");
-    for (const CaseReport& one : cases) {
-      made += html("<details class=\"case {}\" id=\"{}\"><summary><bdi>{}</bdi></summary>\n", status_of(one), one.id(),
-                   one.name);
-      made += case_section(one, 3, paths);
-      made += html("</details>\n");
-    }
+    return case_section(cases[0], 2, paths);
   }
-  made += html("</main>\n");
-  made += footer(command);
-  made += {"<script>" + std::string(embedded::report_js()) + "</script>\n</body>\n</html>\n"};
+  Markup made = cohort_section(cases, tsv);
+  made += heading(2, "Case by case");
+  for (const CaseReport& one : cases) {
+    made +=
+        part("case_in_cohort",
+             {{"status", status_of(one)}, {"id", one.id()}, {"name", one.name}, {"case", case_section(one, 3, paths)}});
+  }
   return made;
+}
+
+std::string html_of(const std::vector<CaseReport>& cases, const std::string& tsv, const std::string& command,
+                    bool paths) {
+  const bool many = cases.size() > 1;
+  const std::string title = many ? fmt::format("{} cases", cases.size()) : cases[0].name;
+  const auto as_it_is = [](std::string_view text) { return Markup{std::string(text)}; };
+  return part("page", {{"script_hash", as_it_is(sha256_base64(embedded::report_js()))},
+                       {"style_hash", as_it_is(sha256_base64(embedded::report_css()))},
+                       {"version", version},
+                       {"title", title},
+                       {"style", as_it_is(embedded::report_css())},
+                       {"class", as_it_is(many ? " class=\"many\"" : "")},
+                       {"heading", many ? as_it_is(title) : part("name", {{"name", title}})},
+                       {"main", main_of(cases, tsv, paths)},
+                       {"made_by", command.empty() ? as_it_is(".") : part("command", {{"command", command}})},
+                       {"licences", embedded::LICENCES_txt()},
+                       {"script", as_it_is(embedded::report_js())}})
+      .text;
 }
 
 }  // namespace
@@ -160,9 +133,7 @@ Page make_page(std::vector<PipelineCase> cases, const PageOptions& options) {
   if (!options.with_names) {
     command = "tunica-report --no-paths";
   }
-  Markup whole = head(reports.size() == 1 ? reports[0].name : fmt::format("{} cases", reports.size()));
-  whole += body(reports, page.tsv, command, options.with_names);
-  page.html = std::move(whole.text);
+  page.html = html_of(reports, page.tsv, command, options.with_names);
   return page;
 }
 

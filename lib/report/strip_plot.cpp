@@ -26,18 +26,23 @@ Markup strip_plot(const Measure& what, const std::vector<StripMark>& marks) {
   for (std::size_t i = 0; i < marks.size(); ++i) {
     // Marks of equal values stay apart: seven lanes, taken in turn.
     const auto height = static_cast<int>(12 + 3 * ((i * 3) % 7));
-    circles += html("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}><title>{}: {} {}</title></circle>", place(marks[i].value),
-                    height, marks[i].outlier ? 4 : 3, marks[i].outlier ? Markup{" class=\"out\""} : Markup{},
-                    marks[i].name, what.text(marks[i].value), what.unit);
+    circles += part("mark", {{"x", place(marks[i].value)},
+                             {"y", height},
+                             {"radius", marks[i].outlier ? 4 : 3},
+                             {"class", Markup{marks[i].outlier ? " class=\"out\"" : ""}},
+                             {"name", marks[i].name},
+                             {"value", what.text(marks[i].value)},
+                             {"unit", what.unit}});
   }
-  return html(
-      "<figure class=\"strip\"><figcaption>{0}{1}</figcaption><svg viewBox=\"0 0 320 58\" role=\"img\" "
-      "aria-label=\"{0}: {2} cases from {3} to {4} {5}, median {6}\"><line class=\"axis\" x1=\"8\" x2=\"312\" "
-      "y1=\"40\" "
-      "y2=\"40\"/><line class=\"median\" x1=\"{7}\" x2=\"{7}\" y1=\"6\" y2=\"40\"/>{8}<text x=\"8\" y=\"54\">{3}</text>"
-      "<text x=\"312\" y=\"54\" text-anchor=\"end\">{4}</text></svg></figure>\n",
-      what.title, what.unit.empty() ? "" : ", " + what.unit, marks.size(), what.text(least), what.text(most), what.unit,
-      what.text(middle), place(middle), circles);
+  return part("strip", {{"title", what.title},
+                        {"comma_unit", what.unit.empty() ? "" : ", " + what.unit},
+                        {"cases", marks.size()},
+                        {"least", what.text(least)},
+                        {"most", what.text(most)},
+                        {"unit", what.unit},
+                        {"median", what.text(middle)},
+                        {"x", place(middle)},
+                        {"marks", circles}});
 }
 
 }  // namespace tunica::report

@@ -30,7 +30,7 @@ const std::map<std::string, Stage>& stages() {
       {"extract", {{"surface.ply"}, {}}},
       {"decimate", {{"coarse.ply"}, {"extract"}}},
       {"relax", {{"shell.ply", "map.png"}, {"extract", "decimate"}}},
-      {"simulate", {{"result.hdf", "picture.png", "refined.ply"}, {"relax"}}},
+      {"simulate", {{"result.hdf", "result.page", "picture.png", "refined.ply"}, {"relax"}}},
   };
   return all;
 }

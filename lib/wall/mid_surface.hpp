@@ -9,6 +9,11 @@ namespace tunica {
 
 enum class WallFace { outer, inner };
 
+/// "outer" or "inner".
+constexpr const char* name_of(WallFace face) { return face == WallFace::outer ? "outer" : "inner"; }
+/// The other one.
+constexpr WallFace behind(WallFace face) { return face == WallFace::outer ? WallFace::inner : WallFace::outer; }
+
 /// The surface half of a wall away from one of its faces.
 struct HalfWaySurface {
   TriangleMesh mesh;              ///< an oriented manifold, normals outward

@@ -16,16 +16,15 @@ decimation, that of a published problem its limit.
 import argparse
 import json
 import math
-import os
-import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import h5py
 import numpy as np
-from published import LINEAR, Bench, fix, grid, load, organ, run_lines, shell, vessel, write_ply
+from meshes import geodesic
+from published import LINEAR, Bench, fix, grid, load, run_lines, shell, vessel, write_ply
+from running import run_tool
 
-BIN = os.path.abspath(os.environ["TUNICA_BIN"])
 ENDS = "[[fix]]\nbody = \"s\"\nwhere = {boundary = true}\ntranslation = \"xyz\"\nrotation = \"xyz\"\n"
 FREE = "[[fix]]\nbody = \"s\"\nwhere = {rigid_motions = true}\n"
 RAMP = "ramp = [[\"0s\", 0.0], [\"1s\", 1.0]]\n"
@@ -64,26 +63,18 @@ class Study:
             if study.get("arguments") == arguments and enough:
                 return record
         path.parent.mkdir(parents=True, exist_ok=True)
-        command = [os.path.join(BIN, "tunica-" + tool), *arguments, "--force", "--quiet", "--report", f"{name}.json"]
-        command += [] if tool == "phantom" else ["--threads", "1"]
+        threads = () if tool == "phantom" else ("--threads", 1)
         records = []
         for _ in range(repeats or self.repeats):
-            path.unlink(missing_ok=True)
-            with subprocess.Popen(command, cwd=self.folder, stdout=subprocess.DEVNULL,
-                                  stderr=subprocess.DEVNULL) as child:
-                _, status, used = os.wait4(child.pid, 0)
-                child.returncode = os.waitstatus_to_exitcode(status)
-            worked = used.ru_utime + used.ru_stime
-            if path.exists():
-                record = json.loads(path.read_text(encoding="utf-8"))
-            else:  # ended by a signal
-                record = {"tool": f"tunica-{tool}", "ok": False, "error": "no report", "command": " ".join(command[1:]),
-                          "seconds": {"total": worked}, "result": {}}
+            done = run_tool(tool, *arguments, "--force", "--quiet", *threads, folder=self.folder, report=f"{name}.json",
+                            code=range(-64, 7))
+            worked = done.processor_seconds
+            record = done.report or {"tool": f"tunica-{tool}", "ok": False, "error": "no report", "command": " ".join(done.args[1:]),
+                                     "seconds": {"total": worked}, "result": {}}  # ended by a signal
             stages = record["seconds"]
             busy = min(1, worked / stages["total"])
             seconds = busy * (stages["total"] - stages.get("read", 0) - stages.get("write", 0))
-            records.append({**record, "study": {"seconds": seconds, "arguments": arguments,
-                                                "exit": f"exit {child.returncode}"}})
+            records.append({**record, "study": {"seconds": seconds, "arguments": arguments, "exit": f"exit {done.returncode}"}})
             if seconds > LONG:
                 break
         records.sort(key=lambda record: record["study"]["seconds"])
@@ -123,9 +114,8 @@ class Study:
         return str(path.relative_to(self.folder))
 
     def draw(self, name, title, marks, *options):
-        subprocess.run([os.path.join(BIN, "tunica-chart"), *marks, "-o", self.out / f"{name}.svg", "--csv",
-                        self.out / f"{name}.csv", "--force", "--quiet", "--series", "setting", "--title", title,
-                        *options], cwd=self.folder, check=True)
+        run_tool("chart", *marks, "-o", self.out / f"{name}.svg", "--csv", self.out / f"{name}.csv", "--force", "--quiet",
+                 "--series", "setting", "--title", title, *options, folder=self.folder)
 
 
 def key_of(setting):
@@ -382,8 +372,7 @@ class Problems(Bench):
 
     def sphere(self, n, **elements):
         """The node that errs most of a sphere under pressure, t = R / 100; p R^2 (1 - nu) / (2 E t)."""
-        points, triangles, _ = organ(n)
-        unit = points / np.linalg.norm(points, axis=1)[:, None]
+        unit, triangles = geodesic(n)
         u = self.solve((10 * unit, triangles, unit), LINEAR + shell("mesh.ply", 0.1, 1.0, 0.3, **elements) + FREE +
                        load("pressure", "1Pa"))
         exact = 1e-6 * 10 ** 2 * 0.7 / (2 * 1.0 * 0.1)

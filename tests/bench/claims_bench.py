@@ -12,18 +12,17 @@ setting beside which the time of a claim stands is 12,800 shells, refitted, and 
 import argparse
 import json
 import math
-import os
 import statistics
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import load_bench
 import numpy as np
-from load_bench import BIN, LOAD, bodies
-from published import LINEAR, grid, load, organ, probe, run_lines, shell, write_ply
+from load_bench import LOAD, bodies
+from meshes import geodesic
+from published import LINEAR, grid, load, probe, run_lines, shell, write_ply
+from running import measure
 
 ASKED = {"displacement": (5, 2, 1), "energy": (5, 2, 1), "volume": (5, 2, 1), "membrane": (5, 2), "stress": (5,)}
 CAREFUL = 12_800
@@ -31,18 +30,10 @@ HEADER = """| body | wall, mm | of | asked, % | shells | model | Newton | estima
 |---|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
-def run(tool, *arguments):
+def run(verb, *words):
     """@return the report, also of a run that failed, and seconds"""
-    with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        start = time.perf_counter()
-        done = subprocess.run([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--report", report, "--force",
-                               "--quiet", "--threads", "1"], stderr=subprocess.PIPE, text=True, check=False)
-        seconds = time.perf_counter() - start
-        if done.returncode not in (0, 4):
-            sys.exit(done.stderr)
-        with open(report, encoding="utf-8") as file:
-            return json.load(file), seconds
+    done = measure(verb, *words, code=(0, 4))
+    return done.report, done.seconds
 
 
 def answers(result):
@@ -156,9 +147,8 @@ def benchmarks(folder, wanted):
         '{probe = "p", axis = "x"}', 0.0940 * 0.9945)
 
     def sphere(n):
-        points, triangles, _ = organ(n // 2)
-        directions = points / np.linalg.norm(points, axis=1)[:, None]
-        return 10 * directions, triangles, directions
+        points, triangles = geodesic(n // 2)
+        return 10 * points, triangles, points
 
     yield from add(
         "geodesic sphere", sphere,

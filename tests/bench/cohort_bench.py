@@ -6,7 +6,6 @@ cases failed other than they should.
 """
 import argparse
 import csv
-import os
 import statistics
 import subprocess
 import sys
@@ -15,15 +14,14 @@ import time
 from pathlib import Path
 
 import cohort
+from running import BIN, SOURCE
 
-SOURCE = Path(__file__).resolve().parents[2]
-TOOLS = Path(os.environ.get("TUNICA_BIN", SOURCE / "build" / "release" / "bin")).resolve()
 
 
 def run(folder, jobs):
     """@return seconds, make's exit code and the rows of summary.tsv"""
     start = time.monotonic()
-    words = {"BIN": TOOLS, "OUT": folder / "out", "CASES": folder / "cases.tsv", "SHELLS": "60", **cohort.WALL}
+    words = {"BIN": BIN, "OUT": folder / "out", "CASES": folder / "cases.tsv", "SHELLS": "60", **cohort.WALL}
     done = subprocess.run(["make", "-f", SOURCE / "Makefile.pipeline", f"-j{jobs}", "-k", *(f"{k}={v}" for k, v in words.items())],
                           capture_output=True, check=False)
     with open(folder / "out" / "summary.tsv", newline="", encoding="utf-8") as file:
@@ -38,7 +36,7 @@ def main():
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory(prefix="tunica-cohort-") as name:
         folder = Path(name)
-        good = cohort.make_cohort(folder, TOOLS, options.cases, (16, 18, 20))
+        good = cohort.make_cohort(folder, options.cases, (16, 18, 20))
         seconds, code, rows = run(folder, options.jobs)
         own = [float(row["seconds"]) for row in rows if row["message"] == "done"]
         print(f"{len(rows)} cases, {len(own)} done, {len(rows) - len(own)} failed: {seconds:.0f} s, exit code {code}; "

@@ -4,36 +4,17 @@ with a ball that slides over it, and with one at rest.
 
     TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/contact_bench.py
 """
-import math
 import tempfile
 
 import numpy as np
 from contact_scenes import RING, SPHERE, contact, ring, sphere, tube
 from contact_scenes_more import plate_on_a_flat
-from published import Bench, fix, run_lines, shell, write_ply
+from meshes import disc
+from published import Bench, fix, grid, run_lines, shell, write_ply
 
 PLATE = 0.13146  # force on the flat over the load, at twice the load of first touch; plate theory
 BALL = ('[[rigid]]\nname = "ball"\nshape = "sphere"\ncentre = ["-2mm", "0mm", "6mm"]\nradius = "5mm"\nmotion = [["0s", '
         '["0mm", "0mm", "0mm"]], ["1s", ["0mm", "0mm", "-1.5mm"]], ["3s", ["{way}mm", "0mm", "-1.5mm"]]]\n')
-
-
-def disc(rings, radius=20.0):
-    """A disc of rings of triangles about its middle."""
-    points, triangles, start = [(0.0, 0.0, 0.0)], [], [0]
-    for ring in range(1, rings + 1):
-        start.append(len(points))
-        turns = 2 * math.pi * np.arange(6 * ring) / (6 * ring)
-        points += [(radius * ring / rings * math.cos(a), radius * ring / rings * math.sin(a), 0.0) for a in turns]
-    for ring in range(1, rings + 1):
-        outer, inner = 6 * ring, 6 * (ring - 1)
-        for k in range(outer):
-            side, place = divmod(k, ring)
-            here = start[ring - 1] + ((side * (ring - 1) + place) % inner if inner else 0)
-            triangles.append((here, start[ring] + k, start[ring] + (k + 1) % outer))
-            if place < ring - 1:
-                triangles.append((here, start[ring] + (k + 1) % outer,
-                                  start[ring - 1] + (side * (ring - 1) + place + 1) % inner))
-    return np.array(points), np.array(triangles)
 
 
 def exactness(bench):
@@ -51,7 +32,7 @@ def exactness(bench):
 def cost(bench):
     print("\n| shells | ball | points | ms per step, median | longest | Newton |\n|---|---|---|---|---|---|")
     for rings in (13, 41):
-        points, triangles = disc(rings)
+        points, triangles = disc(rings, 20.0)
         write_ply(bench.path("mesh.ply"), points, triangles, np.tile([0, 0, 1.0], (len(points), 1)))
         scene = (shell("mesh.ply", 1.0, 1.0, 0.45, density="1100kg/m3") +
                  fix(np.flatnonzero(np.hypot(*points.T[:2]) > 20 - 1e-6)) +
@@ -70,11 +51,7 @@ def candidates(bench):
     """Two held plates apart from each other, at rest: what it takes to find that nothing is near."""
     print("\n| triangles of both plates | ms per step, contact | without |\n|---|---|---|")
     for cells in (16, 50, 158):
-        rows, columns = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
-        points = np.stack([rows.ravel() / cells, columns.ravel() / cells, 0 * rows.ravel()], axis=1) * 100
-        corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)[None]).ravel()
-        triangles = np.concatenate([np.stack([corner, corner + cells + 1, corner + cells + 2], axis=1),
-                                    np.stack([corner, corner + cells + 2, corner + 1], axis=1)])
+        points, triangles, _ = grid(cells, cells, lambda u, v: (100 * u, 100 * v, 0 * u))
         scene, rim = run_lines(kind="dynamic", duration="0.2s", step="40ms"), range(len(points))
         for name, height in (("s", 0.0), ("t", 12.0)):
             write_ply(bench.path(name + ".ply"), points + [0, 0, height], triangles, np.tile([0, 0, 1.0], (len(points), 1)))

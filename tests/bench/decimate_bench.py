@@ -2,13 +2,12 @@
 """Decimation against CGAL's Garland-Heckbert planes at the same counts, as a table; triangles for a certified error.
 
     cmake --build --preset release --target bench_decimate
-    tests/bench/decimate_bench.py build/release [--targets SCRIPT] [--paper FOLDER] [--out docs/tables/decimation.md]
+    PYTHONPATH=tests/support tests/bench/decimate_bench.py build/release [--targets SCRIPT] [--paper FOLDER] [--out docs/tables/decimation.md]
 
 Targets: shapes.py beside this file; SCRIPT, which writes aneurysm_tube.ply, liver_like.ply and bumpy.ply into its working
 folder; the paper's meshes (FOLDER). What is not given is left out. Times are the processor's, on one thread, in turns.
 """
 import argparse
-import json
 import os
 import re
 import subprocess
@@ -17,6 +16,7 @@ import tempfile
 from pathlib import Path
 
 import shapes
+from running import run_tool
 
 ANGLE = 20
 INTRODUCTION = f"""Two-sided certified errors in % of the target's diagonal, processor time of one thread in turns, each with its ratio to that of
@@ -58,13 +58,9 @@ def rows(build, name, path, counts, is_small):
                                    else ["", "", ""])]) + " |"
 
 
-def triangles_within(build, path, percent):
+def triangles_within(path, percent):
     with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        subprocess.run([os.path.join(build, "bin/tunica-decimate"), path, os.path.join(folder, "out.ply"), "--max-error",
-                        f"{percent}%", "--report", report, "--quiet"], check=True)
-        with open(report, encoding="utf-8") as file:
-            return json.load(file)["result"]["triangles"]
+        return run_tool("decimate", path, Path(folder, "out.ply"), "--max-error", f"{percent}%").report["result"]["triangles"]
 
 
 def main():
@@ -81,7 +77,7 @@ def main():
                 lines.append(line)
                 print(line, flush=True)
             if is_small:
-                numbers = [f"{triangles_within(options.build, path, percent):,}" for percent in (1, 0.5, 0.1)]
+                numbers = [f"{triangles_within(path, percent):,}" for percent in (1, 0.5, 0.1)]
                 within.append(f"| {name} | {' | '.join(numbers)} |")
                 print(within[-1], flush=True)
     lines += ["", "Triangles for a certified error of at most that part of the diagonal (`--max-error`):", "",

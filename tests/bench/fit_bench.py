@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 """The fit against its bars: shells, certified distance, shape and seconds per target, as a table.
 
-    TUNICA_BIN=build/release/bin tests/bench/fit_bench.py [--targets SCRIPT] [--data FOLDER] [--only WORD,WORD]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/fit_bench.py [--targets SCRIPT] [--data FOLDER] [--only WORD,WORD]
         [--flat] [--out docs/tables/shells.md]
-    TUNICA_BIN=build/release/bin tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/fit_bench.py --scaling docs/charts/fit-scaling.svg
 
 Targets: shapes.py beside this file; SCRIPT, which writes aneurysm_tube.ply, liver_like.ply and bumpy.ply into its working
 folder; the paper's meshes and organs (FOLDER/paper, FOLDER/volumes, FOLDER/meshes). What is not given is left out, and
@@ -20,8 +20,9 @@ import tempfile
 from pathlib import Path
 
 import shapes
+from meshes import write_ply
+from running import measure, run_tool
 
-BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
 ANGLE = 20  # degrees, where a tolerance is asked for
 ANGLE_OF_PAPER = 5  # its targets' rims ask for it
 MILLIMETRES = ("--mesh-unit", "mm")
@@ -47,15 +48,10 @@ class Case:
         return [*what, "--min-angle", self.angle, *self.unit]
 
 
-def run(tool, *arguments, threads=1):
+def run(verb, *words, threads=1):
     """@return the report, and seconds of the processor; a report without result when the tool failed"""
-    with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        process = subprocess.Popen([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--report", report,
-                                    "--quiet", "--force", "--threads", str(threads)])
-        _, _, usage = os.wait4(process.pid, 0)
-        with open(report, encoding="utf-8") as file:
-            return json.load(file), usage.ru_utime + usage.ru_stime
+    done = measure(verb, *words, threads=threads, code=range(7))
+    return done.report, done.processor_seconds
 
 
 def known_shapes(folder):
@@ -168,7 +164,7 @@ def scaling(folder, chart):
     for n in (36, 72, 144, 288):
         path, out = folder / f"density{n}.ply", folder / f"density{n}-shell.ply"
         if not path.exists():
-            shapes.write_ply(path, *shapes.ball(n, shapes.bumps(7, 0.06, 6)))
+            write_ply(path, *shapes.ball(n, shapes.bumps(7, 0.06, 6)))
         triangles = 12 * n * n
         report, seconds = run("relax", path, path, out, "--tolerance", "0.1%")
         _, certifying = run("compare", out, path, "--shell")
@@ -179,11 +175,10 @@ def scaling(folder, chart):
         print(f"{triangles:9} triangles  shells {report.get('result', {}).get('shells')}  fit {seconds:.3g} s  "
               f"certificate {certifying:.3g} s", flush=True)
     chart = os.path.abspath(chart)
-    subprocess.run([os.path.join(BIN, "tunica-chart"), *(path.name for path in reports), "-o", chart, "--x",
-                    "result.triangles", "--y", "seconds.processor", "--series", "result.series", "--x-label",
-                    "triangles of the target", "--y-label", "processor time (s)", "--title", "Fit and certificate of one shape at four densities",
-                    "--x-scale", "log", "--y-scale", "log", "--lines", "--csv", str(Path(chart).with_suffix(".csv")),
-                    "--force", "--quiet"], check=True, cwd=folder)
+    run_tool("chart", *(path.name for path in reports), "-o", chart, "--x", "result.triangles", "--y", "seconds.processor",
+             "--series", "result.series", "--x-label", "triangles of the target", "--y-label", "processor time (s)", "--title",
+             "Fit and certificate of one shape at four densities", "--x-scale", "log", "--y-scale", "log", "--lines", "--csv",
+             Path(chart).with_suffix(".csv"), "--force", "--quiet", folder=folder)
 
 
 def cases(folder, given, wanted):

@@ -1,21 +1,19 @@
 #!/usr/bin/python3
 """Whether shells serve a load: what 1 kPa does to them against what it does to very many.
 
-    TUNICA_BIN=build/release/bin tests/bench/load_bench.py [--data FOLDER] [--only WORD,WORD] [--out docs/tables/load.md]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/load_bench.py [--data FOLDER] [--only WORD,WORD] [--out docs/tables/load.md]
 
 Phantoms (true surfaces, two wall thicknesses each) and organs of FOLDER/volumes (left out without --data); Young's
 modulus 1 MPa, Poisson's ratio 0.45, nonlinear; open surfaces are held at their boundaries, closed ones carry their own
 pressure. The reference has 12,800 shells: 800 triangles of 20 degrees, twice split in four and refitted.
 """
 import argparse
-import json
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
+from running import measure
+
 COUNT, REFERENCE = 800, 12800
 LOAD = ("--static", "--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45")
 PHANTOMS = {"aneurysm": (1.5, 0.5), "tube": (1.5, 0.5), "bladder": (3, 1), "capsule": (3, 1)}
@@ -33,19 +31,13 @@ Its displacement is off by the order of (mean distance / wall) x (radius / wall)
 shells within 1 % of the diagonal may be off by a tenth of this tube's radius. More of them of the same error change nothing."""
 
 
-def run(tool, *arguments, check=True):
-    """@return the report; none when the tool failed"""
-    with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        done = subprocess.run([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--report", report, "--force",
-                               "--quiet", "--threads", "1"], stderr=subprocess.PIPE, text=True, check=False)
-        if done.returncode != 0:
-            print(done.stderr.strip(), file=sys.stderr, flush=True)
-            if check:
-                sys.exit(done.returncode)
-            return None
-        with open(report, encoding="utf-8") as file:
-            return json.load(file)["result"]
+def run(verb, *words, check=True):
+    """@return the report's result; none when the tool failed"""
+    done = measure(verb, *words, code=0 if check else range(7))
+    if done.returncode != 0:
+        print(done.stderr.strip(), file=sys.stderr, flush=True)
+        return None
+    return done.report["result"]
 
 
 class Body:

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Largest error of one curved patch over random triangles of known surfaces, by the independent evaluation of the tests.
 
-    PYTHONPATH=tests/tools/relax tests/bench/patch_errors.py
+    PYTHONPATH=tests/support tests/bench/patch_errors.py
 
 Corners and normals are the surface's own. Mean and largest of 100 triangles, in millionths of the unit; edges are about
 0.5, of the ellipsoid and the torus 0.25.

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Draws the charts and error maps of docs/reconstruction.md from the tools' own reports.
 
-    TUNICA_BIN=build/release/bin tests/bench/reconstruction_charts.py OUT_FOLDER [--only PART,PART] [--paper FOLDER]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/reconstruction_charts.py OUT_FOLDER [--only PART,PART] [--paper FOLDER]
 
 Parts: `counts` (error against shells and against time, on the true surface of tunica-phantom's aneurysm), `rule` (every
 iteration of the paper's rule with its splits, beside the fit), `maps` (the paper's Fig. 3 to 5). The paper's meshes are
@@ -11,12 +11,10 @@ thread; times are the part of the reports' that the processor was at work for th
 import argparse
 import json
 import os
-import resource
-import subprocess
-import sys
 import tempfile
 
-BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
+from running import run_tool
+
 COUNTS = (60, 120, 240, 480, 960)
 RULE = ("--method", "barycentre", "--surface", "comas")  # the paper's patch
 FIT = {"fit, comas patches": ("--surface", "comas"), "fit, watertight patches": ("--surface", "watertight")}
@@ -36,20 +34,11 @@ class Study:
 
     def run(self, tool, *arguments, check=True):
         """Runs a tool on one thread. @return its report, with `study.seconds` of the processor; none when it failed"""
-        report = self.path("report.json")
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = subprocess.run([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--threads", "1", "--force",
-                               "--report", report], cwd=self.folder, capture_output=True, text=True, check=False)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        with open(report, encoding="utf-8") as file:
-            record = json.load(file)
+        done = run_tool(tool, *arguments, "--threads", 1, "--force", folder=self.folder, code=0 if check else range(7))
         if done.returncode != 0:
-            print(f"{tool}: exit {done.returncode}: {record['error']}", flush=True)
-            if check:
-                sys.exit(done.returncode)
+            print(f"{tool}: exit {done.returncode}: {done.report['error']}", flush=True)
             return None
-        record["study"] = {"seconds": after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime}
-        return record
+        return {**done.report, "study": {"seconds": done.processor_seconds}}
 
     def keep(self, record, **study):
         """A mark of a chart. @return its file"""
@@ -61,9 +50,8 @@ class Study:
         return name
 
     def chart(self, name, marks, *options):
-        subprocess.run([os.path.join(BIN, "tunica-chart"), *marks, "-o", os.path.join(self.out, name + ".svg"), "--csv",
-                        os.path.join(self.out, name + ".csv"), "--force", "--series", "study.series", *options],
-                       cwd=self.folder, check=True)
+        run_tool("chart", *marks, "-o", os.path.join(self.out, name + ".svg"), "--csv", os.path.join(self.out, name + ".csv"),
+                 "--force", "--series", "study.series", *options, folder=self.folder)
 
 
 def error_of(record):

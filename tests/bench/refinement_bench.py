@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """By how much fewer shells would do if they were split only where the error of the strain energy comes from, as a table.
 
-    TUNICA_BIN=build/release/bin tests/bench/refinement_bench.py [--data FOLDER]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/refinement_bench.py [--data FOLDER]
 
 What a shell's energy changes by when it is split in four and refitted stands for its error c_i, of the order of its area.
 With n_i parts of shell i the whole error is sum(c_i / n_i): least, for a given sum of n_i, at n_i in proportion to the

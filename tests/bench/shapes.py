@@ -1,22 +1,14 @@
 #!/usr/bin/python3
-"""Surfaces known by formulas: smooth and closed, open, with creases. `tests/bench/shapes.py FOLDER` writes them all."""
+"""Surfaces known by formulas: smooth and closed, open, with creases.
+
+    PYTHONPATH=tests/support tests/bench/shapes.py FOLDER    writes them all
+"""
 import math
 import sys
 from pathlib import Path
 
 import numpy as np
-
-
-def write_ply(path, vertices, triangles):
-    vertices, triangles = np.asarray(vertices, "<f8"), np.asarray(triangles, "<i4")
-    with open(path, "wb") as out:
-        out.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty double x\n"
-                   f"property double y\nproperty double z\nelement face {len(triangles)}\n"
-                   "property list uchar int vertex_indices\nend_header\n").encode())
-        out.write(vertices.tobytes())
-        faces = np.empty(len(triangles), dtype=[("n", "u1"), ("i", "<i4", 3)])
-        faces["n"], faces["i"] = 3, triangles
-        out.write(faces.tobytes())
+from meshes import write_ply
 
 
 def grid(columns, rows, point, closed_rows=False):

@@ -2,19 +2,17 @@
 """Mean distance of the extracted surface to the true one, in voxels, by voxels' faces and smoothed, and what the steps that
 are left cost the stress, as tables.
 
-    TUNICA_BIN=build/release/bin tests/bench/staircase_bench.py [--out docs/tables/staircase.md]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/staircase_bench.py [--out docs/tables/staircase.md]
 
 The phantoms' surfaces are known by formulas (`tunica-phantom --truth`); aneurysm and tube are open at the image's border.
 """
 import argparse
-import json
 import math
-import os
-import subprocess
 import tempfile
 from pathlib import Path
 
-BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
+from running import run_tool
+
 CASES = (("aneurysm", 256, "1"), ("tube", 256, "1"), ("bladder", 128, "1"), ("capsule", 128, "1"), ("colon", 128, "1"),
          ("bladder", 96, "0.78,0.78,5"), ("colon", 48, "1"), ("colon", 48, "0.78,0.78,5"))
 # Phantoms without ends, with the share of flipped border voxels.
@@ -32,13 +30,8 @@ left cost. Border voxels are flipped with the probability `noise`.
 |---|---|---|---|---|---|---|"""
 
 
-def run(tool, *arguments):
-    with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        subprocess.run([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--report", report, "--quiet", "--force"],
-                       check=True)
-        with open(report, encoding="utf-8") as file:
-            return json.load(file)["result"]
+def run(verb, *words):
+    return run_tool(verb, *words, "--quiet", "--force").report["result"]
 
 
 def mean_distance(folder, name, smoothing):

@@ -2,43 +2,30 @@
 """What a small run pays before and beside its work, as tables: start-up of 1,000 shells under pressure (medians, one
 thread), and seconds per stage of the chain over a small organ.
 
-    TUNICA_BIN=build/release/bin tests/bench/start_bench.py [--out docs/tables/start.md]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/bench/start_bench.py [--out docs/tables/start.md]
 """
 import argparse
-import json
-import os
 import statistics
-import subprocess
 import tempfile
-import time
 from pathlib import Path
 
-BIN = os.path.abspath(os.environ.get("TUNICA_BIN", "build/release/bin"))
+from running import measure
+
 REPEATED = 15
 MATERIAL = ("--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--pressure", "1kPa", "--fix", "rigid-motions")
 BARS = (60, 60)  # ms, MiB
 
 
-def run(tool, folder, *arguments):
-    """@return the report, seconds from the start of the process to its end"""
-    start = time.perf_counter()
-    subprocess.run([os.path.join(BIN, "tunica-" + tool), *map(str, arguments), "--report", "report.json", "--force", "--quiet",
-                    "--threads", "1"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-    seconds = time.perf_counter() - start
-    with open(folder / "report.json", encoding="utf-8") as file:
-        return json.load(file), seconds
-
-
 def chain(folder):
     """@return stages of every tool"""
-    run("phantom", folder, "bladder", "volume.nii.gz", "--size", 64)
+    measure("phantom", "bladder", "volume.nii.gz", "--size", 64, folder=folder)
     steps = (("extract", "volume.nii.gz", "surface.ply", "--label", 1, "--smooth", "staircase"),
              ("decimate", "surface.ply", "coarse.ply", "--triangles", 1000),
              ("relax", "coarse.ply", "surface.ply", "shell.ply", "--refine", "--tolerance", "1%"),
              ("simulate", "shell.ply", "result.hdf", "--static", *MATERIAL))
     for tool, *arguments in steps:
-        report, wall = run(tool, folder, *arguments)
-        yield tool, wall, {name: seconds for name, seconds in report["seconds"].items() if name != "total"}
+        done = measure(tool, *arguments, folder=folder)
+        yield tool, done.seconds, {name: seconds for name, seconds in done.report["seconds"].items() if name != "total"}
 
 
 def main():
@@ -48,9 +35,9 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         stages = list(chain(folder))
-        check = ("simulate", folder, "shell.ply", "--check", "--static", *MATERIAL)
-        start = 1e3 * statistics.median(run(*check)[1] for _ in range(REPEATED))
-        report, _ = run("simulate", folder, "shell.ply", "result.hdf", "--static", *MATERIAL)
+        check = ("simulate", "shell.ply", "--check", "--static", *MATERIAL)
+        start = 1e3 * statistics.median(measure(*check, folder=folder).seconds for _ in range(REPEATED))
+        report = measure("simulate", "shell.ply", "result.hdf", "--static", *MATERIAL, folder=folder).report
         shells, memory = report["result"]["shells"], report["peak_mib"]
     lines = ["| shells | from the start of the process to the first step, ms | whole run, peak memory, MiB |", "|---|---|---|",
              f"| {shells} | {start:.0f} (≤ {BARS[0]}) | {memory:.0f} (≤ {BARS[1]}) |", "",

@@ -15,7 +15,7 @@ constexpr std::array<std::string_view, 10> known{"case/extract.json",
                                                  "case/simulate.log",
                                                  "case/surface.ply",
                                                  "case/shell.ply",
-                                                 "case/result.hdf",
+                                                 "case/result.page",
                                                  ".cases",
                                                  "scan.nii"};
 
@@ -39,13 +39,6 @@ void write_folder(std::string_view bytes) {
 
 }  // namespace
 }  // namespace tunica::fuzz
-
-// HDF5 1.10 loses some hundred bytes of a file that it finds damaged.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5\n"; }
-// It asks for as much memory as that file says, and takes a no for an answer.
-extern "C" const char* __asan_default_options() {
-  return "allocator_may_return_null=1:max_allocation_size_mb=2048:hard_rss_limit_mb=2048";
-}
 
 // A folder of the pipeline, of which a page is made: reports, the record of cases, a log, and the files reports name.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

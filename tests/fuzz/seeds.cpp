@@ -7,7 +7,7 @@
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
-#include "tunica/io/result/result_file.hpp"
+#include "tunica/io/result/page_file.hpp"
 #include "tunica/io/result/run_journal.hpp"
 
 namespace tunica::fuzz {
@@ -175,16 +175,6 @@ void tetrahedra(const fs::path& all) {
   }
 }
 
-Model ball_model() {
-  Model model;
-  ShellBody ball;
-  ball.name = "ball";
-  ball.mesh = test::octahedron(10);
-  ball.thickness = {0.5};
-  model.shells.push_back(ball);
-  return model;
-}
-
 State state_of(const Model& model, double time) {
   State state;
   state.time = state.load_factor = time;
@@ -197,33 +187,26 @@ State state_of(const Model& model, double time) {
   return state;
 }
 
-void results(const Seeds& seeds) {
-  const Model model = ball_model();
-  const std::size_t shells = model.shells[0].mesh.triangles.size();
-  ElementFields fields;
-  fields.membrane_force.assign(shells, Vec3::Ones());
-  fields.bending_moment.assign(shells, Vec3::Ones());
-  for (auto* list : {&fields.von_mises_top, &fields.von_mises_bottom, &fields.membrane_von_mises, &fields.tension,
-                     &fields.pressure}) {
-    list->assign(shells, 0.5);
+void pages(const Seeds& seeds) {
+  const ShellMesh ball = test::octahedron(10);
+  DrawnResult drawn;
+  drawn.reference = drawn.solids = {ball.vertices, ball.triangles};
+  drawn.shells = ball.triangles.size();
+  drawn.scene = "[run]\nkind = \"static\"\n";
+  const std::size_t points = ball.vertices.size();
+  for (const double time : {0.0, 0.5, 1.0}) {
+    drawn.states.push_back({drawn.states.size(), time, time, std::vector<Vec3>(points, Vec3(time, 0, 0)),
+                            std::vector<double>(points, time), std::vector<double>(points, time),
+                            std::vector<Vec3>(points, Vec3::Zero())});
   }
-  fields.von_mises.assign(model.node_count(), 0.5);
-  fields.membrane_stress.assign(model.node_count(), 0.5);
-  fields.principal_strain_top.assign(shells, Vec2(0.1, -0.1));
-  fields.principal_strain_bottom.assign(shells, Vec2(0.1, -0.1));
-  for (const bool series : {false, true}) {
-    ResultOptions options;
-    options.series = series;
-    options.time_units = series ? "s" : "1";
-    options.scene = "[run]\nkind = \"static\"\n";
-    options.tessellation = series ? 2 : 1;
-    options.overwrite = true;
-    ResultFile file(seeds / (series ? "series.hdf" : "static.hdf"), model, options);
-    for (const double time : {0.0, 0.5, 1.0}) {
-      file.append(state_of(model, time), fields);
-    }
-    file.commit(true);
+  write_page_file(seeds / "static.page", drawn, true);
+  drawn.solids = {};
+  drawn.states.pop_back();
+  for (DrawnResult::State& state : drawn.states) {
+    state.of_solids.clear();
   }
+  drawn.kind = DrawnResult::Kind::buckling;
+  write_page_file(seeds / "modes.page", drawn, true);
 }
 
 void journals(const Seeds& seeds) {
@@ -269,9 +252,9 @@ void folders(const Seeds& seeds, const fs::path& all, const fs::path& texts) {
   bundle += "=== case/simulate.log\ntunica-simulate: it failed\n";
   seeds.put("reports", bundle);
   const std::string mesh = read_file(all / "ply" / "ball.ply");
-  const std::string result = read_file(all / "result" / "static.hdf");
+  const std::string page = read_file(all / "page" / "static.page");
   seeds.put("whole", bundle + "=== case/surface.ply\n" + mesh + "\n=== case/shell.ply\n" + mesh +
-                         "\n=== case/result.hdf\n" + result + "\n");
+                         "\n=== case/result.page\n" + page + "\n");
 }
 
 }  // namespace
@@ -289,7 +272,7 @@ int main(int count, char** arguments) {
   other_volumes(all);
   meshes(all);
   tetrahedra(all);
-  results({all, "result"});
+  pages({all, "page"});
   journals({all, "journal"});
   quantities({all, "quantity"});
   folders({all, "pipeline"}, all, texts);

@@ -4,7 +4,8 @@ import gzip
 import random
 import shutil
 import struct
-import subprocess
+
+from running import run_tool
 
 SHAPES = ("sphere", "tube", "aneurysm", "capsule", "bladder", "colon")
 WALL = {"IMAGED_AT": "0kPa", "YOUNG": "1MPa", "POISSON": "0.45"}
@@ -27,9 +28,8 @@ BROKEN = {
 }
 
 
-def phantom(tools, path, shape, size, noise, seed):
-    subprocess.run([tools / "tunica-phantom", shape, path, "--size", str(size), "--spacing", "2", "--noise", str(noise),
-                    "--seed", str(seed), "--quiet"], check=True)
+def phantom(path, shape, size, noise=0, seed=1):
+    run_tool("phantom", shape, path, "--size", size, "--spacing", 2, "--noise", noise, "--seed", seed, "--quiet")
 
 
 def header(dims, dimensions=3):
@@ -45,7 +45,7 @@ def header(dims, dimensions=3):
     return bytes(data)
 
 
-def make_cohort(folder, tools, count, sizes, seed=1):
+def make_cohort(folder, count, sizes, seed=1):
     """Writes `count` good cases and the broken ones, mixed, as folder/cases.tsv. @return the names of the good ones."""
     choice = random.Random(seed)
     scans = folder / "scans"
@@ -59,12 +59,12 @@ def make_cohort(folder, tools, count, sizes, seed=1):
     for number in range(count):
         shape = SHAPES[number % len(SHAPES)]
         name = f"{number:03}-{shape}"
-        phantom(tools, scans / f"{name}.nii.gz", shape, choice.choice(sizes), choice.choice((0, 0, 0.05, 0.1)), number + 1)
+        phantom(scans / f"{name}.nii.gz", shape, choice.choice(sizes), choice.choice((0, 0, 0.05, 0.1)), number + 1)
         good.append(name)
         line(name, f"scans/{name}.nii.gz", pressure=choice.choice(("0.2kPa", "0.5kPa", "1kPa")),
              open=str(int(shape in ("tube", "aneurysm"))))
     model = scans / "model.nii.gz"
-    phantom(tools, model, "aneurysm", 24, 0, 1)
+    phantom(model, "aneurysm", 24)
     for name in BROKEN:
         shutil.copy(model, scans / f"{name}.nii.gz")
     (scans / "truncated.nii.gz").write_bytes(model.read_bytes()[:-60])

@@ -13,6 +13,7 @@ import numpy as np
 from contact_meshes import (arc, belt, eighth_of_a_ball, extruded, hoop_of_shells, mirrored, positive, quarter_disc,
                             shell_masses, solid_masses, whole_ball, whole_sphere)
 from contact_scenes import block, contact, lengths, octant, plane, symmetric, table, write_vtk
+from meshes import Ply
 from published import LINEAR, Bench, fix, grid, load, probe, run_lines, shell, write_ply
 
 PLAQUE = {0.3: (0.136993, 3.3932e-3), 0.45: (0.160984, 3.4214e-3)}  # widened by .3: outward way of the wall, pressure
@@ -387,15 +388,9 @@ class InMetres(Bench):
 
 
 def ply_in_metres(path):
-    with open(path, "rb") as file:
-        header, body = file.read().split(b"end_header\n", 1)
-    count = int(re.search(rb"element vertex (\d+)", header)[1])
-    columns = header.count(b"property double")
-    rows = np.frombuffer(body, "<f8", count * columns).reshape(count, columns).copy()
-    rows[:, :3] /= 1000
-    with open(path, "wb") as file:
-        file.write(header.replace(b"comment units mm", b"comment units m") + b"end_header\n" + rows.tobytes() +
-                   body[8 * count * columns:])
+    ply = Ply(path)
+    more = {name: ply.fields[name] for name in ply.fields.dtype.names[3:]}
+    write_ply(path, ply.vertices / 1000, ply.triangles, comments=["units m"], **more)
 
 
 def vtk_in_metres(path):

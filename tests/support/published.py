@@ -2,14 +2,13 @@
 import json
 import math
 import os
-import subprocess
 
 import h5py
 import numpy as np
 
-from meshes import write_ply_mm as write_ply
+from meshes import geodesic, rows_around, write_ply_mm as write_ply
+from running import run_tool
 
-SIMULATE = os.path.join(os.environ["TUNICA_BIN"], "tunica-simulate")
 MEMBRANES = ("cst", "opt", "adapt")
 BENDINGS = ("comas", "comas-consistent", "dkt", "dkt-comas")
 
@@ -36,56 +35,26 @@ def vessel(around, along):
         r = 10 + 10 * np.exp(-((z - 30) / 10)**2) * ((1 + np.cos(angle)) / 2)**2
         return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=-1)
 
-    j, i = np.meshgrid(np.arange(along + 1), np.arange(around), indexing="ij")
-    angle = (2 * math.pi * (i + (j % 2) / 2) / around).ravel()
-    z = (60 * j / along).ravel()
+    angle, part, triangles = rows_around(around, along)
+    z = 60 * part
     d = 1e-5
     normals = np.cross(point(angle + d, z) - point(angle - d, z), point(angle, z + d) - point(angle, z - d))
-    triangles = []
-    for row in range(along):
-        for k in range(around):
-            a, b = row * around + k, row * around + (k + 1) % around
-            c, e = a + around, b + around
-            triangles += [(a, b, c), (b, e, c)] if row % 2 == 0 else [(a, b, e), (a, e, c)]
-    return point(angle, z), np.array(triangles), normals / np.linalg.norm(normals, axis=1)[:, None]
+    return point(angle, z), triangles, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def organ(frequency):
     """A closed bumpy organ of mean radius 10 over a geodesic sphere, 20 x frequency^2 triangles, with its normals."""
-    golden = (1 + math.sqrt(5)) / 2
-    corners = np.array([(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0), (0, -1, golden),
-                        (0, 1, golden), (0, -1, -golden), (0, 1, -golden), (golden, 0, -1), (golden, 0, 1),
-                        (-golden, 0, -1), (-golden, 0, 1)])
-    faces = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6),
-             (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10),
-             (8, 6, 7), (9, 8, 1)]
-    nodes, points, triangles = {}, [], []
-
-    def node(face, i, j):
-        weights = tuple(sorted((c, w) for c, w in zip(face, (frequency - i - j, i, j)) if w))
-        if weights not in nodes:
-            nodes[weights] = len(points)
-            points.append(sum(w * corners[c] for c, w in weights))
-        return nodes[weights]
-
-    for face in faces:
-        for i in range(frequency):
-            for j in range(frequency - i):
-                triangles.append((node(face, i, j), node(face, i + 1, j), node(face, i, j + 1)))
-                if i + j + 1 < frequency:
-                    triangles.append((node(face, i + 1, j), node(face, i + 1, j + 1), node(face, i, j + 1)))
-
     def surface(directions):
         d = directions / np.linalg.norm(directions, axis=1)[:, None]
         x, y, z = d.T
         return d * (10 * (1 + 0.12 * np.sin(3 * x + 1) * np.cos(4 * y) + 0.08 * np.sin(5 * z + 2 * x)))[:, None]
 
-    d = np.array(points) / np.linalg.norm(points, axis=1)[:, None]
+    d, triangles = geodesic(frequency)
     a = np.cross(d, np.where(np.abs(d[:, :1]) < 0.7, [(1.0, 0, 0)], [(0, 1.0, 0)]))
     a *= 1e-5 / np.linalg.norm(a, axis=1)[:, None]
     b = np.cross(d, a)
     normals = np.cross(surface(d + a) - surface(d - a), surface(d + b) - surface(d - b))
-    return surface(d), np.array(triangles), normals / np.linalg.norm(normals, axis=1)[:, None]
+    return surface(d), triangles, normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def run_lines(**keys):
@@ -130,14 +99,11 @@ class Bench:
         """@return the report's result; its exit code and message stay in `code` and `error`"""
         with open(self.path(name + ".toml"), "w", encoding="utf-8") as file:
             file.write(scene)
-        command = [SIMULATE, "--scene", name + ".toml", name + ".hdf", "--force", "--quiet", "--report", name + ".json"]
-        done = subprocess.run(command + (["--threads", str(threads)] if threads else []), cwd=self.folder,
-                              capture_output=True, text=True, check=False)
+        done = run_tool("simulate", "--scene", name + ".toml", name + ".hdf", "--force", "--quiet",
+                        *(["--threads", threads] if threads else []), folder=self.folder, report=name + ".json",
+                        code=0 if check else range(7))
         self.code, self.error = done.returncode, done.stderr.strip()
-        if check and self.code != 0:
-            raise RuntimeError(self.error)
-        with open(self.path(name + ".json"), encoding="utf-8") as file:
-            return json.load(file)["result"]
+        return done.report["result"]
 
     def displacements(self, name="run"):
         """Of every written state: states x nodes x 3."""

@@ -58,14 +58,6 @@ bool Handle::close() {
   }
 }
 
-Handle opened_for_reading(const std::filesystem::path& path) {
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS));
-  (void)H5Pset_file_locking(access.get(), 0, 1);
-  // The cache believes the index how long a chunk without filters is; without a cache its place in the file is read.
-  (void)H5Pset_cache(access.get(), 0, 0, 0, 0);
-  return Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
-}
-
 Writer::Writer(const std::filesystem::path& path) : name_(path.string()) {
   // Errors become exceptions; the library's own account of them is not for users.
   (void)H5dont_atexit();

@@ -1,12 +1,13 @@
 #include "tunica/io/result/result_export.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/draw/shaded_surface.hpp"
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/signed_file.hpp"
-#include "tunica/io/result/detail/result_grid.hpp"
-#include "tunica/io/result/detail/result_surface.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 #include "tunica/io/result/detail/vtu_file.hpp"
 #include "tunica/io/result/shell_deck.hpp"
+#include "tunica/mechanics/runs/result_grid.hpp"
 
 #include <fmt/format.h>
 
@@ -197,9 +198,9 @@ struct ResultExport::Implementation {
       const std::size_t all = field.of_cells ? grid.cells() : grid.points();
       const std::size_t first = field.of_cells ? part.first_cell : 0;
       const std::size_t rows = field.of_cells ? part.cells : all;
-      text += attribute(field, options.series ? rows_of(float32, times.size() * all, field.components,
-                                                        state * all + first, rows, place)
-                                              : part_of(float32, all, field.components, first, rows, place));
+      text += attribute(
+          field, series ? rows_of(float32, times.size() * all, field.components, state * all + first, rows, place)
+                        : part_of(float32, all, field.components, first, rows, place));
     }
     return text;
   }
@@ -217,7 +218,7 @@ struct ResultExport::Implementation {
         "<Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
         only ? parts.front().name : "bodies");
     // Without a series the file holds the last state alone.
-    for (std::size_t state = options.series || times.empty() ? 0 : times.size() - 1; state < times.size(); ++state) {
+    for (std::size_t state = series || times.empty() ? 0 : times.size() - 1; state < times.size(); ++state) {
       const std::string time = fmt::format("<Time Value=\"{}\"/>\n", times[state]);
       if (!only) {
         text +=
@@ -255,10 +256,24 @@ struct ResultExport::Implementation {
     return wanted;
   }
 
-  void write_models_and_surfaces() const {
-    for (const std::string& ending : options.surfaces) {
-      write_result_surface(beside(result, ending), grid, last, options.made_by, options.space, options.overwrite);
+  void write_surfaces() const {
+    if (options.surfaces.empty()) {
+      return;
     }
+    const auto [mesh, stress] = grid.moved_shells(last);
+    const ShadedSurface shaded = shaded_surface(mesh, stress);
+    PlyOptions ply;
+    ply.comments = {"made by " + options.made_by,
+                    fmt::format("colours: membrane stress (von Mises) from 0 to {:.4g} MPa", shaded.largest)};
+    ply.space = options.space;
+    ply.overwrite = options.overwrite;
+    for (const std::string& ending : options.surfaces) {
+      write_surface(beside(result, ending), mesh, ply, {shaded.normals, shaded.colours});
+    }
+  }
+
+  void write_models_and_surfaces() const {
+    write_surfaces();
     for (const Deck deck : decks()) {
       write_file(beside(result, deck == Deck::inp ? ".inp" : ".feb"),
                  deck_text(model, options.run, deck, options.made_by), options.overwrite);
@@ -268,6 +283,7 @@ struct ResultExport::Implementation {
   const Model& model;
   fs::path result;
   ExportOptions options;
+  bool series = !std::holds_alternative<StaticRun>(options.run.kind);  // as ResultFile
   ResultGrid grid;
   std::vector<double> times;
   std::vector<std::vector<float>> last;  ///< fields of the last state, for surfaces

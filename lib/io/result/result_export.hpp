@@ -18,9 +18,8 @@ struct ExportOptions {
   bool feb = false;  ///< STEM.feb: the model for FEBio
   /// The last state's shells, coloured by stress, for each ending of write_surface() here: STEM.glb
   std::vector<std::string> surfaces = {};
-  RunSettings run = {};      ///< of the model that inp and feb hold
+  RunSettings run = {};      ///< inp and feb hold it, too
   std::string made_by = {};  ///< provenance
-  bool series = false;       ///< as ResultOptions
   int tessellation = 0;      ///< as ResultOptions
   bool overwrite = false;
   std::string space = "LPS";  ///< world axes of the shells, which surfaces say

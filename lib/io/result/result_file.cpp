@@ -6,9 +6,10 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/result/detail/contact_record.hpp"
 #include "tunica/io/result/detail/hdf5_file.hpp"
-#include "tunica/io/result/detail/result_grid.hpp"
-#include "tunica/io/result/detail/triangle_rule.hpp"
+#include "tunica/io/result/detail/page_states.hpp"
+#include "tunica/mechanics/runs/result_grid.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/shell/patch/triangle_rule.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -289,15 +290,20 @@ struct Record {
 struct ResultFile::Implementation {
   Implementation(const std::filesystem::path& path, const Model& the_model, const ResultOptions& options)
       : model(the_model),
-        series(options.series),
+        name(path),
+        about_run(options),
+        series(!std::holds_alternative<StaticRun>(options.run.kind)),
         output(path, options.overwrite),
         grid(the_model, options.tessellation),
+        page(the_model, grid),
         writer(output.partial_path()) {
     write_about(options);
     write_grid();
     make_fields();
     make_history();
-    describe_all(options.time_units);
+    describe_all(std::holds_alternative<DynamicRun>(options.run.kind)     ? "s"
+                 : std::holds_alternative<FrequencyRun>(options.run.kind) ? "Hz"
+                                                                          : "1");
     writer.flush();
   }
 
@@ -634,6 +640,7 @@ struct ResultFile::Implementation {
     for (std::size_t i = 0; i < elements.size(); ++i) {
       elements[i].append(writer, 1, by_element[i].data());
     }
+    page.append(state, of_elements, on_grid);
     for (FixedField& field : fixed) {
       field.put(writer);
     }
@@ -650,9 +657,12 @@ struct ResultFile::Implementation {
 
   // Handles close in reverse order, the file last.
   const Model& model;
+  const std::filesystem::path name;
+  const ResultOptions about_run;
   const bool series;
   OutputFile output;
   ResultGrid grid;
+  PageStates page;
   Writer writer;
   Handle tunica_group;
   Handle vtk;
@@ -689,6 +699,13 @@ void ResultFile::commit(bool converged) {
   const unsigned char value = converged ? 1 : 0;
   implementation_->writer.rewrite(implementation_->converged, H5T_NATIVE_UINT8, &value);
   implementation_->writer.close();
+  DrawnResult drawn = implementation_->page.drawn();
+  const ResultOptions& about = implementation_->about_run;
+  drawn.kind = static_cast<DrawnResult::Kind>(about.run.kind.index());
+  drawn.is_unloaded = about.is_unloaded;
+  drawn.scene = about.scene;
+  drawn.made_by = fmt::format("tunica {}: {}", version, about.command);
+  write_page_file(page_path(implementation_->name), drawn, about.overwrite);
   implementation_->output.commit();
 }
 

@@ -12,10 +12,10 @@
 namespace tunica {
 
 struct ResultOptions {
-  /// False: /VTKHDF holds one loaded state, the last one appended (Version {1,0}), which every ParaView from 5.10 on
-  /// shows deformed. True: every state, with times (Version {2,0}, Steps).
-  bool series = false;
-  std::string time_units = "1";  ///< of the states' `time`
+  /// Of a static run /VTKHDF holds one loaded state, the last one appended (Version {1,0}), which every ParaView from
+  /// 5.10 on shows deformed; of all others every state, with times (Version {2,0}, Steps).
+  RunSettings run;
+  bool is_unloaded = false;  ///< the reference is not what was imaged, but the shape without the pressure of then
   std::string command;
   std::string scene;                                        ///< resolved, SI
   std::string accuracy;                                     ///< what is claimed, JSON; empty: nothing
@@ -30,7 +30,8 @@ struct ResultOptions {
 ///
 /// Everything goes to NAME.part. A state is flushed when append() returns and counted last, so that NAME.part can be
 /// read after a kill; it stays behind from the first state on, until commit() renames it. The file is not locked: it
-/// can be read while it grows.
+/// can be read while it grows. With it goes NAME with the ending .page, what a page shows of the run (page_file.hpp),
+/// of which nothing is there before commit().
 class ResultFile {
 public:
   /// Writes the reference geometry. `model` must outlive this. Errors: OutputError.
@@ -42,7 +43,7 @@ public:
   /// Errors: OutputError, for example when the disk is full; what was appended before stays readable.
   void append(const State& state, const ElementFields& fields);
 
-  /// Closes the file and gives it its name. Errors: OutputError.
+  /// Writes the page's data, closes the file and gives it its name. Errors: OutputError.
   void commit(bool converged);
 
 private:

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 6\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 7\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -194,10 +194,10 @@ void state_members(Archive& archive, AnyState& state) {
 
 template <typename Archive, typename AnyMemory>
 void motion_members(Archive& archive, AnyMemory& memory) {
-  auto& [velocity, acceleration, auxiliary, acting, last_change, part, at_rest, viscous_rate, deformation_before,
-         length_before] = memory;
-  each(archive, velocity, acceleration, auxiliary, acting, last_change, part, at_rest, viscous_rate, deformation_before,
-       length_before);
+  auto& [velocity, acceleration, auxiliary, acting, touching, last_change, part, at_rest, viscous_rate,
+         deformation_before, length_before] = memory;
+  each(archive, velocity, acceleration, auxiliary, acting, touching, last_change, part, at_rest, viscous_rate,
+       deformation_before, length_before);
 }
 
 void Packer::put(const MotionMemory& value) { motion_members(*this, value); }

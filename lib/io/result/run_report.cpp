@@ -1,6 +1,8 @@
 #include "tunica/io/result/run_report.hpp"
 
+#include "tunica/core/quantity.hpp"
 #include "tunica/io/result/detail/contact_record.hpp"
+#include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 
 #include <fmt/format.h>
@@ -8,7 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
+#include <iterator>
 #include <numbers>
 
 namespace tunica {
@@ -25,115 +27,55 @@ Json known(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json triple(const Vec3& v) { return Json::array({known(v.x()), known(v.y()), known(v.z())}); }
 
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
-/// The records of contacts and rigid bodies, where there are any.
-void prepare_contacts(Json& result, const Model& model) {
-  const auto lists = [](Json& record, std::initializer_list<const char*> keys) {
-    for (const char* key : keys) {
-      record[key] = Json::array();
-    }
-  };
-  for (const Contact& contact : model.contacts) {
-    lists(result["contacts"][contact.name],
-          {"time_s", "load_factor", "force_n", "moment_n_mm", "area_mm2", "smallest_gap_mm", "points", "slip_mm"});
-  }
-  for (const RigidBody& rigid : model.rigids) {
-    lists(result["rigid"][rigid.name], {"time_s", "load_factor", "force_n", "moment_n_mm", "position_mm"});
-  }
-  if (!model.contacts.empty()) {
-    result["balance"] = {{"force", nullptr}, {"moment", nullptr}};
-  }
+template <typename Value>
+Json or_null(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json();
 }
 
-void report_contacts(Json& result, const Model& model, const State& state, bool dynamic) {
-  if (state.time == 0) {
-    return;  // the reference, before anything moves
+Json list_of_when(const std::vector<RunRecord::When>& when, bool is_motion) {
+  Json record{{"time_s", Json::array()}, {"load_factor", Json::array()}};
+  for (const RunRecord::When& one : when) {
+    record["time_s"].push_back(is_motion ? Json(one.time) : Json());
+    record["load_factor"].push_back(one.load_factor);
   }
-  const auto when = [&](Json& record) {
-    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
-    record["load_factor"].push_back(state.load_factor);
-  };
-  for (std::size_t i = 0; i < model.contacts.size(); ++i) {
-    const ContactState now = contact_of(state, i);
-    Json& record = result["contacts"][model.contacts[i].name];
-    when(record);
-    record["force_n"].push_back(triple(now.force));
-    record["moment_n_mm"].push_back(triple(now.moment));
-    record["area_mm2"].push_back(known(now.area));
-    record["smallest_gap_mm"].push_back({{"lower", known(now.gap_lower)}, {"upper", known(now.gap_upper)}});
-    record["points"].push_back(now.points);
-    record["slip_mm"].push_back(known(now.slip));
-  }
-  for (std::size_t i = 0; i < model.rigids.size(); ++i) {
-    const RigidState now = rigid_of(state, i);
-    Json& record = result["rigid"][model.rigids[i].name];
-    when(record);
-    record["force_n"].push_back(triple(now.force));
-    record["moment_n_mm"].push_back(triple(now.moment));
-    record["position_mm"].push_back(triple(now.position));
-  }
-  const auto largest = [](Json& so_far, double now) {
-    so_far = known(so_far.is_null() ? now : std::max(so_far.get<double>(), now));
-  };
-  if (!state.contacts.empty()) {
-    largest(result["balance"]["force"], state.force_imbalance);
-    largest(result["balance"]["moment"], state.moment_imbalance);
-  }
+  return record;
 }
 
-}  // namespace
-
-void prepare_result(Json& result, const Model& model) {
-  std::size_t shells = 0;
-  for (const ShellBody& body : model.shells) {
-    shells += body.mesh.triangles.size();
-  }
-  std::size_t tetrahedra = 0;
-  for (const SolidBody& body : model.solids) {
-    tetrahedra += body.mesh.tetrahedra.size();
-  }
-  result = {{"shells", shells},
-            {"tetrahedra", tetrahedra},
-            {"nodes", model.node_count()},
-            {"dof", nullptr},
-            {"steps", 0},
-            {"step_parts", 0},
-            {"converged", false},
-            {"max_displacement_mm", nullptr},
-            {"peak", nullptr},
-            {"displacement_p99_mm", nullptr},
-            {"max_node_displacement_mm", nullptr},
-            {"wall", nullptr},
-            {"volume_before_mm3", nullptr},
-            {"volume_after_mm3", nullptr},
-            {"strain_energy_mj", nullptr},
-            {"residual", nullptr},
-            {"algebraic_error_percent", nullptr},
-            {"algebraic_error_is_lower_bound", false},
-            {"newton_iterations", 0},
-            {"cg_iterations", 0},
-            {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
-            {"real_time_factor", nullptr},
-            {"probes", Json::object()},
-            {"frequencies_hz", Json::array()},
-            {"buckling_factors", Json::array()},
-            {"limit_load_factors", Json::array()},
-            {"branch_load_factors", Json::array()},
-            {"snaps", Json::array()},
-            {"energy", nullptr},
-            {"estimates", Json::object()},
-            {"short_waves_stiffened_from", nullptr}};
-  for (const Probe& probe : model.probes) {
-    result["probes"][probe.name] = {{"time_s", Json::array()},
-                                    {"load_factor", Json::array()},
-                                    {"displacement_mm", Json::array()},
-                                    {"rotation_rad", Json::array()}};
-  }
-  prepare_contacts(result, model);
+/// A list of what `of` makes of each value.
+template <typename Value, typename Of>
+Json list(const std::vector<Value>& values, const Of& of) {
+  Json made = Json::array();
+  std::ranges::transform(values, std::back_inserter(made), of);
+  return made;
 }
 
-namespace {
+void report_tracks(Json& result, const RunRecord& record) {
+  for (const auto& [name, values] : record.probes) {
+    Json& track = result["probes"][name] = list_of_when(record.when, record.is_motion);
+    track["displacement_mm"] = list(values, [](const auto& value) { return triple(value.displacement); });
+    track["rotation_rad"] = list(values, [](const auto& value) { return triple(value.rotation); });
+  }
+  for (const auto& [name, values] : record.contacts) {
+    Json& track = result["contacts"][name] = list_of_when(record.moved, record.is_motion);
+    track["force_n"] = list(values, [](const ContactState& now) { return triple(now.force); });
+    track["moment_n_mm"] = list(values, [](const ContactState& now) { return triple(now.moment); });
+    track["area_mm2"] = list(values, [](const ContactState& now) { return known(now.area); });
+    track["smallest_gap_mm"] = list(values, [](const ContactState& now) {
+      return Json{{"lower", known(now.gap_lower)}, {"upper", known(now.gap_upper)}};
+    });
+    track["points"] = list(values, [](const ContactState& now) { return Json(now.points); });
+    track["slip_mm"] = list(values, [](const ContactState& now) { return known(now.slip); });
+  }
+  for (const auto& [name, values] : record.rigids) {
+    Json& track = result["rigid"][name] = list_of_when(record.moved, record.is_motion);
+    track["force_n"] = list(values, [](const RigidState& now) { return triple(now.force); });
+    track["moment_n_mm"] = list(values, [](const RigidState& now) { return triple(now.moment); });
+    track["position_mm"] = list(values, [](const RigidState& now) { return triple(now.position); });
+  }
+  if (!record.contacts.empty()) {
+    result["balance"] = {{"force", or_null(record.force_imbalance)}, {"moment", or_null(record.moment_imbalance)}};
+  }
+}
 
 Json wall_report(const WallNumbers& wall) {
   return {{"membrane_p99_mpa", wall.membrane_p99},
@@ -148,39 +90,27 @@ Json wall_report(const WallNumbers& wall) {
           {"strain_max_percent", 1e2 * wall.strain_max}};
 }
 
-}  // namespace
-
-void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic) {
-  double most = 0;
-  for (const Vec3& u : state.displacement) {
-    most = std::max(most, u.norm());
+void report_last_state(Json& result, const RunRecord& record) {
+  if (!record.last) {
+    return;
   }
-  result["max_displacement_mm"] = fields.largest_displacement;
-  result["max_node_displacement_mm"] = most;
-  if (!model.shells.empty()) {
-    result["displacement_p99_mm"] = fields.displacement_p99;
-    result["wall"] = wall_report(fields.wall);
-    result["wall"]["left_out_percent"] = 1e2 * fields.wall.left_out;
-    result["wall"]["whole"] = wall_report(fields.wall.whole);
+  const LastState& last = *record.last;
+  result["max_displacement_mm"] = last.largest_displacement;
+  result["max_node_displacement_mm"] = record.node_displacement;
+  if (record.shells > 0) {
+    result["displacement_p99_mm"] = last.displacement_p99;
+    result["wall"] = wall_report(last.wall);
+    result["wall"]["left_out_percent"] = 1e2 * last.wall.left_out;
+    result["wall"]["whole"] = wall_report(last.wall.whole);
   }
-  if (result["volume_before_mm3"].is_null()) {
-    result["volume_before_mm3"] = or_null(state.volume);
+  result["volume_before_mm3"] = or_null(record.volume_before);
+  result["volume_after_mm3"] = or_null(record.volume_after);
+  result["strain_energy_mj"] = record.strain_energy;
+  result["residual"] = record.residual;
+  if (last.peak) {
+    result["peak"] = {{"max_displacement_mm", last.peak->displacement}, {"time_s", last.peak->time}};
   }
-  result["volume_after_mm3"] = or_null(state.volume);
-  result["strain_energy_mj"] = state.strain_energy;
-  result["residual"] = state.residual;
-  for (const Probe& probe : model.probes) {
-    const std::size_t node = model.first_node(probe.body) + probe.node;
-    Json& record = result["probes"][probe.name];
-    record["time_s"].push_back(dynamic ? Json(state.time) : Json());
-    record["load_factor"].push_back(state.load_factor);
-    record["displacement_mm"].push_back(triple(state.displacement[node]));
-    record["rotation_rad"].push_back(triple(state.rotation[node]));
-  }
-  report_contacts(result, model, state, dynamic);
 }
-
-Json peak_report(const Peak& peak) { return {{"max_displacement_mm", peak.displacement}, {"time_s", peak.time}}; }
 
 void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration) {
   result["dof"] = summary.dof;
@@ -222,6 +152,7 @@ void report_summary(Json& result, const Summary& summary, bool converged, std::o
   }
 }
 
+// Modes have shapes, but no size.
 void report_modes(Json& result, const Summary& summary) {
   for (const char* key : {"max_displacement_mm", "displacement_p99_mm", "max_node_displacement_mm", "wall",
                           "volume_after_mm3", "strain_energy_mj"}) {
@@ -231,21 +162,108 @@ void report_modes(Json& result, const Summary& summary) {
   result["buckling_factors"] = summary.buckling_factors;
 }
 
-Json accuracy_report(const Accuracy& accuracy) {
+Json unloaded_report(const Unloaded& unloaded) {
+  return {{"volume_mm3", or_null(unloaded.volume)},
+          {"distance_mm", {{"mean", unloaded.mean_distance}, {"max", unloaded.largest_distance}}},
+          {"roundness", unloaded.roundness
+                            ? Json{{"image", unloaded.roundness->image}, {"unloaded", unloaded.roundness->unloaded}}
+                            : Json()},
+          {"iterations", unloaded.iterations}};
+}
+
+Json estimates_report(const Estimates& estimates) {
+  Json report = Json::object();
+  for (const auto& [key, estimate] : estimates) {
+    report[key] = {{"percent", known(100 * estimate.error)}, {"credible", estimate.credible}, {"from", estimate.from}};
+  }
+  return report;
+}
+
+}  // namespace
+
+RunRecord::RunRecord(const Model& model, const RunSettings& run)
+    : begun(true),
+      nodes(model.node_count()),
+      is_motion(std::holds_alternative<DynamicRun>(run.kind)),
+      is_modes(std::holds_alternative<FrequencyRun>(run.kind) || std::holds_alternative<BucklingRun>(run.kind)) {
+  for (const ShellBody& body : model.shells) {
+    shells += body.mesh.triangles.size();
+  }
+  for (const SolidBody& body : model.solids) {
+    tetrahedra += body.mesh.tetrahedra.size();
+  }
+  const auto begin = [](auto& tracks, const auto& named) {
+    for (const auto& one : named) {
+      tracks.push_back({one.name, {}});
+    }
+  };
+  begin(probes, model.probes);
+  begin(contacts, model.contacts);
+  begin(rigids, model.rigids);
+}
+
+void RunRecord::take(const Model& model, const State& state, const ElementFields& fields) {
+  constexpr double most_bending = std::numbers::pi / 6;
+  node_displacement = 0;
+  for (const Vec3& u : state.displacement) {
+    node_displacement = std::max(node_displacement, u.norm());
+  }
+  std::optional<Peak> peak = last ? last->peak : std::nullopt;
+  if (is_motion && (!peak || peak->displacement < fields.largest_displacement)) {
+    peak = {fields.largest_displacement, state.time};
+  }
+  last = {fields.wall, fields.largest_displacement, fields.displacement_p99,
+          count_unresolved(model, state, most_bending), peak};
+  if (!volume_before) {
+    volume_before = state.volume;
+  }
+  volume_after = state.volume;
+  strain_energy = state.strain_energy;
+  residual = state.residual;
+  when.push_back({state.time, state.load_factor});
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    const std::size_t node = model.first_node(model.probes[i].body) + model.probes[i].node;
+    probes[i].values.push_back({state.displacement[node], state.rotation[node]});
+  }
+  if (state.time == 0) {
+    return;  // the reference, before anything moves
+  }
+  moved.push_back(when.back());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    contacts[i].values.push_back(contact_of(state, i));
+  }
+  for (std::size_t i = 0; i < rigids.size(); ++i) {
+    rigids[i].values.push_back(rigid_of(state, i));
+  }
+  const auto largest = [](std::optional<double>& so_far, double now) {
+    now = so_far ? std::max(*so_far, now) : now;
+    so_far = std::isfinite(now) ? std::optional(now) : std::nullopt;
+  };
+  if (!state.contacts.empty()) {
+    largest(force_imbalance, state.force_imbalance);
+    largest(moment_imbalance, state.moment_imbalance);
+  }
+}
+
+Json accuracy_report(const Accuracy& accuracy, bool times) {
   Json levels = Json::array(), choices = Json::array();
   for (const AccuracyLevel& level : accuracy.levels) {
     levels.push_back({{"shells", level.shells},
                       {"value", level.value},
-                      {"seconds", level.seconds},
                       {"mean_distance_mm", or_null(level.mean_distance)},
                       {"newton_iterations", level.newton_iterations}});
+    if (times) {
+      levels.back()["seconds"] = level.seconds;
+    }
   }
   for (const AccuracyChoice& choice : accuracy.choices) {
     choices.push_back({{"part", choice.part},
                        {"chosen", choice.chosen},
                        {"error_percent", choice.error ? Json(100 * *choice.error) : Json()},
-                       {"instead", choice.instead},
-                       {"would_cost", choice.would_cost}});
+                       {"instead", choice.instead}});
+    if (times) {
+      choices.back()["would_cost"] = choice.would_cost;
+    }
   }
   const AccuracyRequest& request = accuracy.request;
   const bool probed = request.of == Quantity::probe;
@@ -262,13 +280,81 @@ Json accuracy_report(const Accuracy& accuracy) {
           {"not_included", accuracy.not_included}};
 }
 
-Json unloaded_report(const Unloaded& unloaded) {
-  return {{"volume_mm3", or_null(unloaded.volume)},
-          {"distance_mm", {{"mean", unloaded.mean_distance}, {"max", unloaded.largest_distance}}},
-          {"roundness", unloaded.roundness
-                            ? Json{{"image", unloaded.roundness->image}, {"unloaded", unloaded.roundness->unloaded}}
-                            : Json()},
-          {"iterations", unloaded.iterations}};
+Json run_report(const RunRecord& record) {
+  if (!record.begun) {
+    return Json::object();
+  }
+  Json result = {{"shells", record.shells},
+                 {"tetrahedra", record.tetrahedra},
+                 {"nodes", record.nodes},
+                 {"dof", nullptr},
+                 {"steps", 0},
+                 {"step_parts", 0},
+                 {"converged", false},
+                 {"max_displacement_mm", nullptr},
+                 {"peak", nullptr},
+                 {"displacement_p99_mm", nullptr},
+                 {"max_node_displacement_mm", nullptr},
+                 {"wall", nullptr},
+                 {"volume_before_mm3", nullptr},
+                 {"volume_after_mm3", nullptr},
+                 {"strain_energy_mj", nullptr},
+                 {"residual", nullptr},
+                 {"algebraic_error_percent", nullptr},
+                 {"algebraic_error_is_lower_bound", false},
+                 {"newton_iterations", 0},
+                 {"cg_iterations", 0},
+                 {"ms_per_step", {{"median", nullptr}, {"max", nullptr}}},
+                 {"real_time_factor", nullptr},
+                 {"probes", Json::object()},
+                 {"frequencies_hz", Json::array()},
+                 {"buckling_factors", Json::array()},
+                 {"limit_load_factors", Json::array()},
+                 {"branch_load_factors", Json::array()},
+                 {"snaps", Json::array()},
+                 {"energy", nullptr},
+                 {"estimates", estimates_report(record.estimates)},
+                 {"short_waves_stiffened_from", nullptr}};
+  report_tracks(result, record);
+  report_last_state(result, record);
+  if (record.accuracy) {
+    Json& claim = result["accuracy"] = accuracy_report(*record.accuracy);
+    if (const auto& made = record.certificate) {
+      claim["min_angle_deg"] = made->angle;
+      if (const auto& distance = made->distance) {
+        claim["hausdorff_mm"] = {{"lower", distance->lower}, {"upper", distance->upper}};
+        claim["hausdorff_percent"] = {{"lower", 100 * distance->lower / made->diagonal},
+                                      {"upper", 100 * distance->upper / made->diagonal}};
+      }
+    }
+  }
+  if (record.prestress_residual) {
+    result["prestress"] = {{"pressure_mpa", or_null(record.imaging_pressure)},
+                           {"residual", *record.prestress_residual},
+                           {"stable", or_null(record.rests_as_imaged)}};
+  }
+  if (record.unloaded) {
+    result["unloaded"] = unloaded_report(*record.unloaded);
+  }
+  if (record.summary) {
+    report_summary(result, *record.summary, record.converged, record.duration);
+    if (record.is_modes) {
+      report_modes(result, *record.summary);
+    }
+  }
+  return result;
+}
+
+std::vector<Warning> prestress_warnings(const RunRecord& record) {
+  if (record.rests_as_imaged.value_or(true)) {
+    return {};
+  }
+  return {
+      {Weight::major, "unstable image",
+       "a wall of this stiffness and thickness cannot rest in the shape of the image under the pressure of then: "
+       "some dent snaps to another shape by itself, so that under any other pressure displacements are that jump "
+       "and stresses those after it; the stress in the shape of the image is in balance, no more: smooth the surface "
+       "(SMOOTH), take a stiffer or thicker wall, or put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)"}};
 }
 
 std::vector<Warning> unloaded_warnings(const Unloaded& unloaded) {
@@ -282,14 +368,6 @@ std::vector<Warning> unloaded_warnings(const Unloaded& unloaded) {
                    "{:.2g}): a living wall hardly folds like that, so the unloaded shape is doubtful; without "
                    "--unloaded the wall is prestressed as imaged instead",
                    unloaded.roundness->image, unloaded.roundness->unloaded)}};
-}
-
-Json estimates_report(const Estimates& estimates) {
-  Json report = Json::object();
-  for (const auto& [key, estimate] : estimates) {
-    report[key] = {{"percent", known(100 * estimate.error)}, {"credible", estimate.credible}, {"from", estimate.from}};
-  }
-  return report;
 }
 
 namespace {
@@ -325,23 +403,13 @@ void for_each_notable(const Estimates& estimates, const Tell& tell) {
 std::vector<Warning> estimate_warnings(const Estimates& estimates) {
   std::vector<Warning> warnings;
   for_each_notable(estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
-    warnings.push_back(
-        {estimate.error < answer.large ? Weight::minor : Weight::major, "error of the mesh",
-         fmt::format("{} may be off by {:.2g} % by its mesh ({}): take more shells (SHELLS), or let "
-                     "--accuracy 5% --of {} (ACCURACY=5% OF={}) choose them",
-                     answer.name, 100 * estimate.error, estimate.from, name_of(answer.of), name_of(answer.of))});
+    warnings.push_back({estimate.error < answer.large ? Weight::minor : Weight::major, "error of the mesh",
+                        fmt::format("{} may be off by {} by its mesh ({}): take more shells (SHELLS), or let "
+                                    "--accuracy 5% --of {} (ACCURACY=5% OF={}) choose them",
+                                    answer.name, percent_text(estimate.error), estimate.from, name_of(answer.of),
+                                    name_of(answer.of))});
   });
   return warnings;
-}
-
-Json prestress_report(const Model& model, double residual) {
-  Json pressure;
-  for (const Load& load : model.loads) {
-    if (const auto* p = std::get_if<PressureLoad>(&load.kind); p != nullptr && p->imaged_at) {
-      pressure = pressure.is_null() || pressure == *p->imaged_at ? Json(*p->imaged_at) : Json();
-    }
-  }
-  return {{"pressure_mpa", pressure}, {"residual", residual}};
 }
 
 namespace {
@@ -366,7 +434,7 @@ std::string missed_accuracy(const Accuracy& accuracy) {
   return fmt::format(
       "accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
       value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
-      accuracy.estimate ? fmt::format("estimated error {:.2g} %", 100 * *accuracy.estimate) : "error not estimated",
+      accuracy.estimate ? fmt::format("estimated error {}", percent_text(*accuracy.estimate)) : "error not estimated",
       100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
 }
 
@@ -380,9 +448,9 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
   for_each_notable(accuracy.estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
     if (answer.of != request.of) {
       lines.push_back(
-          fmt::format("{} was not asked for, and may be off by {:.2g} % by mesh and model: --of {} (OF={}) asks "
+          fmt::format("{} was not asked for, and may be off by {} by mesh and model: --of {} (OF={}) asks "
                       "for it",
-                      answer.name, 100 * estimate.error, name_of(answer.of), name_of(answer.of)));
+                      answer.name, percent_text(estimate.error), name_of(answer.of), name_of(answer.of)));
     }
   });
   for (const AccuracyChoice& choice : accuracy.choices) {
@@ -410,19 +478,19 @@ std::string modes_note(const Summary& summary, std::size_t asked) {
                      values.size() < asked ? fmt::format(", of {} asked for: there are no more", asked) : "");
 }
 
-std::vector<Warning> contact_warnings(const Model& model, const Summary& summary, const Json& result) {
+std::vector<Warning> contact_warnings(const RunRecord& record) {
   std::vector<Warning> warnings;
-  for (std::size_t c = 0; c < model.contacts.size() && result.contains("contacts"); ++c) {
-    const std::string& name = model.contacts[c].name;
-    const Json& points = result["contacts"][name]["points"];
-    if (points.empty() || std::any_of(points.begin(), points.end(), [](const Json& n) { return n != 0; })) {
+  for (std::size_t c = 0; c < record.contacts.size(); ++c) {
+    const auto& [name, states] = record.contacts[c];
+    if (states.empty() || std::ranges::any_of(states, [](const ContactState& state) { return state.points != 0; })) {
       continue;
     }
-    if (c < summary.contact_pressures.size() && summary.contact_pressures[c] > 0) {
+    const std::vector<double>& pressures = record.summary->contact_pressures;
+    if (c < pressures.size() && pressures[c] > 0) {
       warnings.push_back({Weight::note, "contact within steps",
                           fmt::format("{}: touches within steps only, with up to {}, and at the end of none: shorter "
                                       "steps show where",
-                                      name, pressure_text(summary.contact_pressures[c]))});
+                                      name, pressure_text(pressures[c]))});
     } else {
       warnings.push_back({Weight::major, "no contact",
                           fmt::format("{}: nothing touches in any step: do these bodies come together?", name)});
@@ -446,6 +514,32 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
                                     "and says more of the support than of the organ",
                                     pressure_text(wall.whole.stress_max))});
   }
+}
+
+/// @param touches  there is contact
+std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches) {
+  std::vector<Warning> warnings;
+  if (energy.gaining_step > 0) {
+    warnings.push_back(
+        {Weight::major, "long steps",
+         fmt::format(
+             "time integration gains energy, {} of the largest so far, more than 10 % from step {} ({:.6g} s) "
+             "on: what moves is faster than it should be: {}",
+             percent_text(energy.gained), energy.gaining_step, energy.gaining_time,
+             touches ? "take integrator = \"backward-euler\", which loses energy and never gains it, and let bodies "
+                       "begin farther apart than the resolution of their contact"
+                     : "take shorter steps, or a smaller spectral_radius")});
+  }
+  constexpr double notable_loss = 0.1;
+  if (energy.lost > notable_loss * energy.largest) {
+    warnings.push_back(
+        {Weight::minor, "long steps",
+         fmt::format(
+             "time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
+             "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
+             1e2 * energy.lost / energy.largest)});
+  }
+  return warnings;
 }
 
 }  // namespace
@@ -478,30 +572,17 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
                      "a dynamic run the motion",
                      snap.load_factor, snap.distance)});
   }
-  if (summary.energy && summary.energy->gaining_step > 0) {
-    warnings.push_back(
-        {Weight::major, "long steps",
-         fmt::format("time integration gains energy, {:.3g} % of the largest so far, more than 10 % from step {} "
-                     "({:.6g} s) on: the steps are too coarse for the motion: take shorter ones, or a smaller "
-                     "spectral_radius",
-                     1e2 * summary.energy->gained, summary.energy->gaining_step, summary.energy->gaining_time)});
-  }
-  constexpr double notable_loss = 0.1;
-  if (summary.energy && summary.energy->lost > notable_loss * summary.energy->largest) {
-    warnings.push_back(
-        {Weight::minor, "long steps",
-         fmt::format(
-             "time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
-             "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
-             1e2 * summary.energy->lost / summary.energy->largest)});
+  if (summary.energy) {
+    std::ranges::move(energy_warnings(*summary.energy, !summary.contact_pressures.empty()),
+                      std::back_inserter(warnings));
   }
   constexpr double notable_bend = 0.25;  // of what swings with half of the largest motion: a ninth of its period
   if (summary.largest_bend > notable_bend * summary.largest_motion) {
     warnings.push_back(
         {Weight::minor, "long steps",
-         fmt::format("the steps are long for what swings: from one to the next the motion bends by {:.2g} % of its "
+         fmt::format("the steps are long for what swings: from one to the next the motion bends by {} of its "
                      "largest value: take shorter ones, or error control (adaptive)",
-                     1e2 * summary.largest_bend / summary.largest_motion)});
+                     percent_text(summary.largest_bend / summary.largest_motion))});
   }
   if (summary.stiffened_from) {
     warnings.push_back(

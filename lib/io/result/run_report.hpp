@@ -6,54 +6,13 @@
 #include "tunica/mechanics/runs/fields.hpp"
 #include "tunica/mechanics/runs/unloaded.hpp"
 
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
 /// What a report says of a simulation, key by key as the contract names them (mm, MPa, mJ, s).
 namespace tunica {
-
-/// All keys, undefined until the run fills them; `contacts`, `rigid` and `balance` only where the model has them.
-void prepare_result(Json& result, const Model& model);
-
-/// What is known of a run that may still fail. The records of probes, contacts and rigid bodies grow, the latter two
-/// not by the reference state.
-void report_state(Json& result, const Model& model, const State& state, const ElementFields& fields, bool dynamic);
-
-/// Of a run that has ended.
-/// @param duration  s, that was simulated
-void report_summary(Json& result, const Summary& summary, bool converged, std::optional<double> duration);
-
-/// Of a run for modes, after report_summary(): they have shapes, but no size, so nothing of a deformed state is
-/// claimed.
-void report_modes(Json& result, const Summary& summary);
-
-/// What a run for an accuracy claims, and how it got there.
-Json accuracy_report(const Accuracy& accuracy);
-
-/// The shape without the pressure under which the organ was imaged.
-Json unloaded_report(const Unloaded& unloaded);
-
-/// Where it is hardly that of a living wall.
-std::vector<Warning> unloaded_warnings(const Unloaded& unloaded);
-
-/// How far the answers may be off, by their keys in the report.
-Json estimates_report(const Estimates& estimates);
-
-/// What a user should know of those that no accuracy was asked for: the answers that are off by more than is notable.
-std::vector<Warning> estimate_warnings(const Estimates& estimates);
-
-/// What the wall bears where the image shows it.
-Json prestress_report(const Model& model, double residual);
-
-/// A level on a line.
-std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
-
-/// What a run came to whose accuracy was not reached, and why: "accuracy not reached: stress 159 kPa with 3200
-/// shells, estimated error 12 %, 5 % asked: …".
-std::string missed_accuracy(const Accuracy& accuracy);
-
-/// Claim and choices as lines for a terminal.
-std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
-
-/// A line on the modes found.
-std::string modes_note(const Summary& summary, std::size_t asked);
 
 /// The largest displacement of a motion.
 struct Peak {
@@ -70,14 +29,96 @@ struct LastState {
   std::optional<Peak> peak{};       ///< of a motion, so far
 };
 
-/// The key `peak` of a motion's report.
-Json peak_report(const Peak& peak);
+/// Something of a model from state to state.
+template <typename Value>
+struct Track {
+  std::string name;
+  std::vector<Value> values;
+};
+
+/// Shells that leave a run for an accuracy.
+struct ShellCertificate {
+  double angle = 0;                  ///< degrees, smallest
+  std::optional<Interval> distance;  ///< mm, two-sided, to the target where there is one
+  double diagonal = 0;               ///< mm, of the target
+};
+
+/// What is known of a run, from its start on and also where it fails.
+struct RunRecord {
+  struct When {
+    double time = 0;  ///< s, of a motion
+    double load_factor = 0;
+  };
+  struct ProbeValue {
+    Vec3 displacement, rotation;  ///< mm; radians
+  };
+
+  bool begun = false;
+  std::size_t shells = 0, tetrahedra = 0, nodes = 0;
+  bool is_motion = false, is_modes = false;
+  std::vector<When> when;                 ///< of all states
+  std::vector<Track<ProbeValue>> probes;  ///< in these
+  std::vector<When> moved;                ///< of all but the reference
+  std::vector<Track<ContactState>> contacts;
+  std::vector<Track<RigidState>> rigids;
+  std::optional<double> force_imbalance, moment_imbalance;  ///< the largest, relative
+  std::optional<LastState> last;
+  double node_displacement = 0;  ///< mm, the largest
+  std::optional<double> volume_before, volume_after;
+  double strain_energy = 0, residual = 0;  ///< of the last state
+  std::optional<Summary> summary;          ///< of a run that has ended
+  bool converged = false;
+  std::optional<double> duration;               ///< s, that was simulated
+  std::shared_ptr<const Accuracy> accuracy;     ///< what is claimed
+  std::optional<ShellCertificate> certificate;  ///< of the shells it ended with
+  std::optional<double> imaging_pressure;       ///< MPa, of a prestressed wall, where it is one
+  std::optional<double> prestress_residual;     ///< of that wall
+  std::optional<bool> rests_as_imaged;          ///< System::rests_as_imaged()
+  std::shared_ptr<const Unloaded> unloaded;     ///< the shape without the pressure of the image
+  Estimates estimates;                          ///< how far the answers may be off
+
+  RunRecord() = default;
+  explicit RunRecord(const Model& model, const RunSettings& run);
+
+  /// Takes up a state. The records of contacts and rigid bodies do not have the reference.
+  void take(const Model& model, const State& state, const ElementFields& fields);
+};
+
+/// All keys of a report, undefined where the run has not got there; `contacts`, `rigid` and `balance` only where the
+/// model has them, `accuracy`, `prestress`, `unloaded` where the run has. Of modes, which have shapes but no size,
+/// nothing of a deformed state is claimed.
+Json run_report(const RunRecord& record);
+
+/// What a run for an accuracy claims, and how it got there. @param times  with what levels took and would take
+Json accuracy_report(const Accuracy& accuracy, bool times = true);
+
+/// Where a wall cannot rest in the shape of its image.
+std::vector<Warning> prestress_warnings(const RunRecord& record);
+
+/// Where it is hardly that of a living wall.
+std::vector<Warning> unloaded_warnings(const Unloaded& unloaded);
+
+/// What a user should know of those that no accuracy was asked for: the answers that are off by more than is notable.
+std::vector<Warning> estimate_warnings(const Estimates& estimates);
+
+/// A level on a line.
+std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);
+
+/// What a run came to whose accuracy was not reached, and why: "accuracy not reached: stress 159 kPa with 3200
+/// shells, estimated error 12 %, 5 % asked: …".
+std::string missed_accuracy(const Accuracy& accuracy);
+
+/// Claim and choices as lines for a terminal.
+std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
+
+/// A line on the modes found.
+std::string modes_note(const Summary& summary, std::size_t asked);
 
 /// What a user should know of a run that has ended well.
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);
 
 /// Contacts in which nothing ever touches; a note of those in which something does within steps only.
-/// @param result  of a run that has ended
-std::vector<Warning> contact_warnings(const Model& model, const Summary& summary, const Json& result);
+/// @param record  of a run that has ended
+std::vector<Warning> contact_warnings(const RunRecord& record);
 
 }  // namespace tunica

@@ -48,6 +48,8 @@ void require_no_lone_rotations(const Model& model) {
 
 }  // namespace
 
+std::string deck_number(double value) { return fmt::format("{:.13g}", value); }
+
 void require_expressible(const Model& model, const RunSettings& run, Deck deck) {
   const auto* statics = std::get_if<StaticRun>(&run.kind);
   if (statics == nullptr) {

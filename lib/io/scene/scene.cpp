@@ -4,7 +4,6 @@
 #include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/scene/detail/body_files.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
-#include "tunica/io/scene/detail/selection.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -39,16 +38,17 @@ std::string said_at(const Scene& scene, const Place& place) {
 Load resolve_load(const Scene& scene, const SceneLoad& load, std::size_t body_number, const SelectableBody& body) {
   Load result{body_number, load.kind, load.ramp, said_at(scene, load.places.item)};
   if (load.where) {
-    const std::vector<Index> nodes = nodes_of(body, *load.where, load.places);
+    const std::string& where = load.places.of("where").text;
+    const std::vector<Index> nodes = nodes_of(body, *load.where, where);
     if (auto* pressure = std::get_if<PressureLoad>(&result.kind)) {
-      require_triangle(body, nodes, load.places);
+      require_triangle(body, nodes, where);
       pressure->nodes = nodes;
     } else if (auto* force = std::get_if<ForceLoad>(&result.kind)) {
       force->nodes = nodes;
     } else if (auto* moment = std::get_if<MomentLoad>(&result.kind)) {
       moment->nodes = nodes;
     } else if (auto* edge = std::get_if<EdgeLoad>(&result.kind)) {
-      edge->edges = edges_of(body, nodes, load.places);
+      edge->edges = edges_of(body, nodes, where);
     }
   }
   return result;
@@ -57,7 +57,8 @@ Load resolve_load(const Scene& scene, const SceneLoad& load, std::size_t body_nu
 // A fix per rim.
 void resolve_slide(const SceneFix& fix, std::size_t number, const SelectableBody& body, const std::string& said_at,
                    Model& model) {
-  for (Rim& rim : rims_within(body, nodes_of(body, fix.where, fix.places), fix.places)) {
+  const std::string& where = fix.places.of("where").text;
+  for (Rim& rim : rims_within(body, nodes_of(body, fix.where, where), where)) {
     Fix slide;
     slide.body = number;
     slide.nodes = std::move(rim.nodes);
@@ -84,13 +85,14 @@ void hold_the_rest(const Scene& scene, Model& model) {
 
 std::vector<Index> attached_nodes(const Model& model, const SceneAttach& attach, std::size_t to,
                                   const SelectableBody& body) {
+  const std::string& where = attach.places.of("where").text;
   const auto* touching = std::get_if<TouchingNodes>(&attach.where);
   if (touching == nullptr) {
-    return nodes_of(body, attach.where, attach.places);
+    return nodes_of(body, attach.where, where);
   }
-  return model.is_solid(to)
-             ? nodes_touching(body, touching->distance, model.solids[to - model.shells.size()], attach.places)
-             : nodes_touching(body, touching->distance, model.shells[to], attach.side, attach.places);
+  return model.is_solid(to) ? nodes_touching(body, touching->distance, model.solids[to - model.shells.size()], where)
+                            : nodes_touching(body, touching->distance, model.shells[to], attach.side, where,
+                                             attach.places.of("to").text);
 }
 
 // A node goes where one body carries it: no other may, and no fix hold it. Only of resolved fixes.
@@ -160,8 +162,7 @@ std::size_t body_index(const Scene& scene, const std::string& name, const Places
 }
 
 std::optional<std::size_t> rigid_index(const Scene& scene, std::string_view name) {
-  const auto found = std::find_if(scene.rigids.begin(), scene.rigids.end(),
-                                  [&](const SceneRigid& rigid) { return rigid.name == name; });
+  const auto found = std::ranges::find(scene.rigids, name, &SceneRigid::name);
   return found == scene.rigids.end() ? std::nullopt : std::optional(narrow<std::size_t>(found - scene.rigids.begin()));
 }
 
@@ -226,17 +227,16 @@ void settle_solver(Scene& scene) {
 }
 
 void settle_until(Scene& scene) {
-  auto* path = std::get_if<ArcLengthRun>(&scene.run.kind);
-  if (path == nullptr || !path->until) {
+  if (!scene.until) {
     return;
   }
-  const auto found = std::find_if(scene.probes.begin(), scene.probes.end(),
-                                  [&](const SceneProbe& probe) { return probe.name == scene.until_probe; });
+  const auto found = std::ranges::find(scene.probes, scene.until->probe, &SceneProbe::name);
   if (found == scene.probes.end()) {
     scene.run_places.of("until").fail(
-        fmt::format("there is no [[probe]] \"{}\": add it, or name another", scene.until_probe));
+        fmt::format("there is no [[probe]] \"{}\": add it, or name another", scene.until->probe));
   }
-  path->until->probe = narrow<std::size_t>(found - scene.probes.begin());
+  std::get<ArcLengthRun>(scene.run.kind).until = {narrow<std::size_t>(found - scene.probes.begin()), scene.until->axis,
+                                                  scene.until->reaches};
 }
 
 namespace {
@@ -263,22 +263,13 @@ void warn_of_far_point(const Vec3& point, std::size_t body, const Place& place, 
 }
 
 void warn_of_far_points(const Scene& scene, const Model& model, std::vector<Warning>& warnings) {
-  const auto look = [&](const std::string& body, const Selection& where, const Places& places) {
-    if (const auto* nearest = std::get_if<NearestNode>(&where)) {
-      warn_of_far_point(nearest->point, body_index(scene, body, places), places.item, model, warnings);
+  for_each_where(scene, [&](const auto& item, const std::optional<Selection>& where) {
+    if (const auto* nearest = where ? std::get_if<NearestNode>(&*where) : nullptr) {
+      warn_of_far_point(nearest->point, body_index(scene, item.body, item.places), item.places.item, model, warnings);
     }
-  };
-  for (const SceneFix& fix : scene.fixes) {
-    look(fix.body, fix.where, fix.places);
-  }
-  for (const SceneLoad& load : scene.loads) {
-    look(load.body, load.where.value_or(AllNodes{}), load.places);
-  }
-  for (const SceneAttach& attach : scene.attachments) {
-    look(attach.body, attach.where, attach.places);
-  }
+  });
   for (const SceneProbe& probe : scene.probes) {
-    look(probe.body, NearestNode{probe.nearest}, probe.places);
+    warn_of_far_point(probe.nearest, body_index(scene, probe.body, probe.places), probe.places.item, model, warnings);
   }
 }
 
@@ -337,14 +328,16 @@ Model resolve_scene(const Scene& scene, SceneBodies parts) {
     } else if (fix.slide) {
       resolve_slide(fix, b, bodies[b], said_at(scene, fix.places.item), model);
     } else {
-      model.fixes.push_back({b, nodes_of(bodies[b], fix.where, fix.places), fix.translation, fix.rotation,
-                             fix.displacement.value_or(Vec3::Zero()), fix.ramp, said_at(scene, fix.places.item)});
+      model.fixes.push_back({b, nodes_of(bodies[b], fix.where, fix.places.of("where").text), fix.translation,
+                             fix.rotation, fix.displacement.value_or(Vec3::Zero()), fix.ramp,
+                             said_at(scene, fix.places.item)});
     }
   }
   for (const SceneSupport& support : scene.supports) {
     const std::size_t b = body_index(scene, support.body, support.places);
-    const std::vector<Index> nodes = nodes_of(bodies[b], support.where.value_or(AllNodes{}), support.places);
-    require_triangle(bodies[b], nodes, support.places);
+    const std::string& where = support.places.of("where").text;
+    const std::vector<Index> nodes = nodes_of(bodies[b], support.where.value_or(AllNodes{}), where);
+    require_triangle(bodies[b], nodes, where);
     model.supports.push_back({b, nodes, support.stiffness, support.normal_only, said_at(scene, support.places.item)});
   }
   hold_the_rest(scene, model);
@@ -366,7 +359,8 @@ Model resolve_scene(const Scene& scene, SceneBodies parts) {
   }
   for (const SceneProbe& probe : scene.probes) {
     const std::size_t b = body_index(scene, probe.body, probe.places);
-    model.probes.push_back({probe.name, b, nodes_of(bodies[b], NearestNode{probe.nearest}, probe.places).front()});
+    model.probes.push_back(
+        {probe.name, b, nodes_of(bodies[b], NearestNode{probe.nearest}, probe.places.of("where").text).front()});
   }
   return model;
 }

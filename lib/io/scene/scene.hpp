@@ -5,6 +5,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/warning.hpp"
 #include "tunica/mechanics/model/model.hpp"
+#include "tunica/mechanics/model/selection.hpp"
 
 #include <filesystem>
 #include <map>
@@ -70,6 +71,7 @@ struct SceneSolid {
 
 /// A rigid body whose shape is in a file.
 struct SceneRigidMesh {
+  static constexpr std::string_view name = "mesh";
   std::filesystem::path mesh;
   std::optional<double> unit_mm;  ///< as of a shell
   double scale = 1;
@@ -83,38 +85,6 @@ struct SceneRigid {
   std::optional<Table<Vec3>> motion;  ///< mm
   Places places;
 };
-
-/// Regions include what lies on their border, to `region_tolerance` of the body's bounding-box diagonal, so that
-/// coordinates written with seven digits (float files, decimal text) still meet their plane.
-inline constexpr double region_tolerance = 1e-6;
-
-struct AllNodes {};
-struct BoundaryNodes {};
-struct RigidMotions {};  ///< not nodes: the six rigid motions of each piece; only in a fix
-struct BoxNodes {
-  Vec3 lower, upper;  ///< mm
-};
-struct HalfSpaceNodes {
-  int axis = 0;
-  double at = 0;  ///< mm
-  bool below = true;
-};
-struct SphereNodes {
-  Vec3 centre;        ///< mm
-  double radius = 0;  ///< mm
-};
-struct ListedNodes {
-  std::vector<Index> nodes;  ///< of the body, in file order
-};
-struct NearestNode {
-  Vec3 point;  ///< mm
-};
-/// All within this distance of the body that is to carry them; only in an attachment.
-struct TouchingNodes {
-  double distance = 0;  ///< mm
-};
-using Selection = std::variant<AllNodes, BoundaryNodes, RigidMotions, BoxNodes, HalfSpaceNodes, SphereNodes,
-                               ListedNodes, NearestNode, TouchingNodes>;
 
 struct SceneFix {
   std::string body;
@@ -169,14 +139,24 @@ struct SceneProbe {
   Places places;
 };
 
-/// Meshes and model are then chosen.
-struct SceneAccuracy {
-  double within = 0;  ///< of the quantity, relative
+struct SceneAnswer {
   Quantity of = Quantity::displacement;
-  std::string probe;                                     ///< of Quantity::probe
-  int axis = 0;                                          ///< of its displacement
+  std::string probe;  ///< of Quantity::probe
+  int axis = 0;       ///< of its displacement
+};
+
+/// How accurate the answer is to be: meshes and model are then chosen.
+struct SceneAccuracy : SceneAnswer {
+  double within = 0;                                     ///< of the quantity, relative
   std::map<std::string, std::filesystem::path> targets;  ///< by body: the surface that its mesh was fitted to
   Places places;
+};
+
+/// Where a path by arc length ends, its probe by name.
+struct SceneUntil {
+  std::string probe;
+  int axis = 0;
+  double reaches = 0;  ///< mm
 };
 
 /// MPa: the stiffness of a wall of which none is stated, because none is needed.
@@ -186,7 +166,7 @@ struct Scene {
   RunSettings run;
   std::optional<SceneAccuracy> accuracy;
   bool cg_tolerance_stated = false;
-  std::string until_probe;  ///< of an arc-length run, whose `until` names it; empty where it has none
+  std::optional<SceneUntil> until;  ///< of an arc-length run
   Places run_places;
   std::vector<SceneShell> shells;
   std::vector<SceneSolid> solids;
@@ -210,7 +190,7 @@ std::vector<double> equal_load_factors(std::size_t steps);
 /// count without a requirement (the paper's setting). Errors: a contradiction with solver = "direct".
 void settle_solver(Scene& scene);
 
-/// Finds the probe that `until` of an arc-length run names. Errors: there is none of that name.
+/// Finds the probe that `until` names, and tells the run. Errors: there is none of that name.
 void settle_until(Scene& scene);
 
 /// Checks all that can be checked without a mesh: ranges, signs, required densities, names, duplicates.
@@ -243,10 +223,6 @@ LoadedScene load_scene(const Scene& scene);
 Model resolve_scene(const Scene& scene, SceneBodies bodies);
 /// Of a scene of shells alone.
 Model resolve_scene(const Scene& scene, std::vector<ShellBody> shells);
-
-/// As scenes and flags name them.
-std::string_view name_of(Membrane membrane);
-std::string_view name_of(Bending bending);
 
 /// The scene as a scene file with everything resolved: SI units, defaults written out. Reading it gives the same scene.
 /// Paths are absolute; those within the folder of `file` are relative to it, so that both may move together.

@@ -1,10 +1,11 @@
-#include "tunica/io/scene/detail/scene_checks.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
+#include "tunica/io/scene/detail/schema.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 namespace tunica {
@@ -18,15 +19,12 @@ constexpr double most_steps = 1e9;
 void check_run(const Scene& scene) {
   const RunSettings& run = scene.run;
   const Places& places = scene.run_places;
+  check_keys(scene_schema().run, scene, places);
   if (const auto* dynamic = std::get_if<DynamicRun>(&run.kind)) {
-    require(is_positive(dynamic->duration), places.of("duration"), "duration must be greater than zero");
-    require(is_positive(dynamic->step), places.of("step"), "step must be greater than zero");
     require(dynamic->step <= dynamic->duration * (1 + 1e-9), places.of("step"), "step is longer than the duration");
     require(dynamic->duration / dynamic->step <= most_steps, places.of("step"),
             fmt::format("{:.3g} steps are too many (at most {:.0e}): lengthen step or shorten duration",
                         dynamic->duration / dynamic->step, most_steps));
-    require(dynamic->spectral_radius >= 0 && dynamic->spectral_radius <= 1, places.of("spectral_radius"),
-            fmt::format("spectral_radius {} is outside [0, 1]: 1 damps nothing, 0 the most", dynamic->spectral_radius));
   }
   const bool needs_direct = std::holds_alternative<FrequencyRun>(run.kind) ||
                             std::holds_alternative<BucklingRun>(run.kind) ||
@@ -36,15 +34,9 @@ void check_run(const Scene& scene) {
                     : places.keys.contains("cg_tolerance") ? "cg_tolerance"
                                                            : "cg_iterations"),
           "frequencies, buckling and arc length need the direct solver: remove what asks for cg");
-  require(run.cg_tolerance > 0 && run.cg_tolerance < 1, places.of("cg_tolerance"),
-          "cg_tolerance must be greater than 0 and less than 1 (100%)");
   if (const auto* path = std::get_if<ArcLengthRun>(&run.kind)) {
-    require(!path->max_factor || is_positive(*path->max_factor), places.of("max_factor"),
-            "max_factor must be greater than 0");
     require(!path->until || path->until->reaches != 0, places.of("until"), "until reaches 0: the path begins there");
   }
-  require(run.converge > 0 && run.converge < 1, places.of("converge"),
-          "converge must be greater than 0 and less than 1");
 }
 
 bool is_list(const std::optional<Selection>& where) { return where && std::holds_alternative<ListedNodes>(*where); }
@@ -64,27 +56,19 @@ void check_material(const SceneBody& body, std::string_view section, std::string
   const Places& places = body.places;
   const Material& material = body.material;
   require(!body.name.empty(), places.of("name"), "name is empty");
-  require(is_positive(body.scale), places.of("scale"), "scale must be greater than zero");
-  require(is_positive(material.young), places.of("young"), "young must be greater than zero");
   require(
       material.young_stated || needs_no_young, places.item,
       fmt::format(
           "[[{}]] \"{}\" has no young, for example young = \"1MPa\": it can be left out only where a static run puts "
           "nothing on shells but the pressure that they were imaged under",
           section, body.name));
-  require(material.poisson > -1 && material.poisson < 0.5, places.of("poisson"),
-          fmt::format("poisson {} is outside (-1, 0.5)", material.poisson));
-  require(!material.density || is_positive(*material.density), places.of("density"),
-          "density must be greater than zero");
   require(needed_by.empty() || material.density, places.item,
           fmt::format("[[{}]] \"{}\" has no density: {} needs it", section, body.name, needed_by));
 }
 
 /// Whether the shells rest as they were imaged, so that equilibrium decides their stress, whatever their stiffness.
 bool rests_as_imaged(const Scene& scene) {
-  const bool alone =
-      scene.solids.empty() && scene.rigids.empty() && scene.contacts.empty() && scene.attachments.empty();
-  return alone && std::holds_alternative<StaticRun>(scene.run.kind) && !scene.loads.empty() &&
+  return is_of_shells_alone(scene) && std::holds_alternative<StaticRun>(scene.run.kind) && !scene.loads.empty() &&
          std::ranges::all_of(scene.loads,
                              [](const SceneLoad& load) {
                                const auto* pressure = std::get_if<PressureLoad>(&load.kind);
@@ -97,8 +81,6 @@ bool rests_as_imaged(const Scene& scene) {
 
 void check_shell(const SceneShell& shell, std::string_view needed_by, bool needs_no_young) {
   require(!shell.mesh.filename().empty(), shell.places.of("mesh"), "mesh names no file");
-  require(shell.thickness_from || is_positive(shell.thickness), shell.places.of("thickness"),
-          "thickness must be greater than zero");
   check_material(shell, "shell", needed_by, needs_no_young);
 }
 
@@ -106,11 +88,37 @@ void check_solid(const SceneSolid& solid, std::string_view needed_by) {
   constexpr double largest_poisson = 0.4999;
   require(!solid.mesh.filename().empty(), solid.places.of(solid.fill_size ? "fill" : "mesh"),
           fmt::format("{} names no file", solid.fill_size ? "fill" : "mesh"));
-  require(!solid.fill_size || is_positive(*solid.fill_size), solid.places.of("size"), "size must be greater than zero");
   check_material(solid, "solid", needed_by, false);
   require(
       solid.material.poisson <= largest_poisson, solid.places.of("poisson"),
       fmt::format("poisson {} of a solid is above {}: choose at most that", solid.material.poisson, largest_poisson));
+}
+
+// The axis of a cylinder tells where its ends are: it must have a direction at all times.
+void check_axis(const RigidCylinder& cylinder, const Places& places) {
+  std::set<double> times;
+  for (const auto* end : {&cylinder.from, &cylinder.to}) {
+    for (const auto& [time, point] : end->points) {
+      times.insert(time);
+    }
+  }
+  std::optional<Vec3> before;
+  for (const double time : times) {
+    const Vec3 axis = cylinder.to.at(time) - cylinder.from.at(time);
+    places.of("to").require(!axis.isZero(0), "from and to are one point: a cylinder needs an axis");
+    // Between two entries the axis goes straight from one to the next: through nothing only where they are opposite.
+    places.of("to").require(!before || axis.normalized().dot(before->normalized()) > -1 + 1e-12,
+                            "the cylinder's axis turns over by passing through nothing: give the way that it turns");
+    before = axis;
+  }
+}
+
+void check_shape(const SceneRigid& rigid) {
+  if (const auto* cylinder = std::get_if<RigidCylinder>(&rigid.shape)) {
+    check_axis(*cylinder, rigid.places);
+  } else if (const auto* mesh = std::get_if<SceneRigidMesh>(&rigid.shape)) {
+    require(!mesh->mesh.filename().empty(), rigid.places.of("mesh"), "mesh names no file");
+  }
 }
 
 // Names become keys of the report and groups of the result file.
@@ -139,7 +147,7 @@ void check_bodies(const Scene& scene) {
     require_new(solid);
   }
   for (const SceneRigid& rigid : scene.rigids) {
-    check_rigid(rigid);
+    check_shape(rigid);
     check_name(rigid.name, rigid.places.of("name"), "rigid body");
     require_new(rigid);
   }
@@ -180,7 +188,6 @@ void check_fix(const Scene& scene, const SceneFix& fix) {
 void check_support(const Scene& scene, const SceneSupport& support) {
   require(!is_solid(scene, body_index(scene, support.body, support.places)), support.places.of("body"),
           "a bed supports shells, and this is a solid: hold it by a [[fix]]");
-  require(is_positive(support.stiffness), support.places.of("stiffness"), "stiffness must be greater than zero");
 }
 
 // What a load can act on.
@@ -203,6 +210,65 @@ void check_load(const Scene& scene, const SceneLoad& load) {
   }
 }
 
+// The body that is carried, the one that carries.
+std::pair<std::size_t, std::size_t> bodies_of(const Scene& scene, const SceneAttach& attach) {
+  for (const auto& [key, name] : {std::pair("body", &attach.body), std::pair("to", &attach.to)}) {
+    attach.places.of(key).require(!rigid_index(scene, *name),
+                                  fmt::format("\"{}\" is rigid: only bodies that deform are attached to each other; "
+                                              "nodes that move as told are a [[fix]] with displacement",
+                                              *name));
+  }
+  return {body_index(scene, attach.body, attach.places, "body"), body_index(scene, attach.to, attach.places, "to")};
+}
+
+void check_attachments(const Scene& scene) {
+  std::map<std::size_t, std::set<std::size_t>> carriers;  // of a body, directly or through others
+  for (const SceneAttach& attach : scene.attachments) {
+    const auto [body, to] = bodies_of(scene, attach);
+    const Places& places = attach.places;
+    places.of("to").require(body != to, fmt::format("\"{}\" is attached to itself: name another body", attach.to));
+    places.of("side").require(
+        !is_solid(scene, to) || (attach.side == Attachment::Side::middle && !places.keys.contains("side")),
+        fmt::format("\"{}\" is a solid and has no side: side belongs to an attachment to a shell", attach.to));
+    places.of("to").require(!carriers[to].contains(body),
+                            fmt::format("\"{}\" carries \"{}\" already: bodies cannot carry each other in a circle",
+                                        attach.body, attach.to));
+    std::set<std::size_t> more = carriers[to];
+    more.insert(to);
+    for (auto& [carried, by] : carriers) {
+      if (carried == body || by.contains(body)) {
+        by.insert(more.begin(), more.end());
+      }
+    }
+    carriers[body].insert(more.begin(), more.end());
+  }
+  for (const SceneFix& fix : scene.fixes) {
+    const auto carried = std::find_if(scene.attachments.begin(), scene.attachments.end(),
+                                      [&](const SceneAttach& attach) { return attach.body == fix.body; });
+    fix.places.of("where").require(
+        !std::holds_alternative<RigidMotions>(fix.where) || carried == scene.attachments.end(),
+        fmt::format("\"{}\" is carried by \"{}\", so its rigid motions are held already: remove this [[fix]]", fix.body,
+                    carried == scene.attachments.end() ? "" : carried->to));
+  }
+}
+
+void check_contacts(const Scene& scene) {
+  std::set<std::pair<std::string, std::string>> pairs;
+  for (const SceneContact& contact : scene.contacts) {
+    const Places& places = contact.places;
+    const auto& [a, b] = contact.between;
+    const Place& between = places.of("between");
+    const bool rigid_a = party_named(scene, a, between).rigid;
+    const bool rigid_b = party_named(scene, b, between).rigid;
+    between.require(!rigid_a || a != b,
+                    fmt::format("\"{}\" is rigid: it cannot touch itself, name a body that deforms", a));
+    between.require(!rigid_a || !rigid_b,
+                    fmt::format("\"{}\" and \"{}\" are both rigid: one of the two must deform", a, b));
+    between.require(pairs.insert(std::minmax(a, b)).second,
+                    fmt::format("there are two contacts between \"{}\" and \"{}\": keep one", a, b));
+  }
+}
+
 // What --accuracy, or [accuracy], can be found for.
 void check_accuracy(const Scene& scene) {
   const SceneAccuracy& asked = *scene.accuracy;
@@ -218,32 +284,19 @@ void check_accuracy(const Scene& scene) {
           "an accuracy finds the step itself: leave out adaptive");
   require(!scene.run.cg_fixed_count, places.item, "asks for convergence, a fixed count of CG iterations for none");
   for (const auto& [name, path] : asked.targets) {
-    const auto body = std::find_if(scene.shells.begin(), scene.shells.end(),
-                                   [&, &wanted = name](const SceneShell& shell) { return shell.name == wanted; });
-    require(body != scene.shells.end(), places.of("target"),
+    require(std::ranges::count(scene.shells, name, &SceneShell::name) > 0, places.of("target"),
             fmt::format("there is no body \"{}\": the bodies are \"{}\"", name,
                         fmt::join(deforming_names(scene), "\", \"")));
   }
-  const bool known = std::any_of(scene.probes.begin(), scene.probes.end(),
-                                 [&](const SceneProbe& probe) { return probe.name == asked.probe; });
-  require(asked.of != Quantity::probe || known, places.of("of"),
-          fmt::format("there is no [[probe]] \"{}\": add it, or name another", asked.probe));
+  require(asked.of != Quantity::probe || std::ranges::count(scene.probes, asked.probe, &SceneProbe::name) > 0,
+          places.of("of"), fmt::format("there is no [[probe]] \"{}\": add it, or name another", asked.probe));
   // A finer mesh has nodes between those of a list, of which the list says nothing.
-  const auto refuse_list = [](const std::optional<Selection>& where, const Places& of) {
+  for_each_where(scene, [](const auto& item, const std::optional<Selection>& where) {
     require(
-        !is_list(where), of.of("where"),
+        !is_list(where), item.places.of("where"),
         "a list of nodes holds for one mesh, and an accuracy takes finer ones: select by place (box, below, sphere, "
         "nearest …)");
-  };
-  for (const SceneFix& fix : scene.fixes) {
-    refuse_list(fix.where, fix.places);
-  }
-  for (const SceneSupport& support : scene.supports) {
-    refuse_list(support.where, support.places);
-  }
-  for (const SceneLoad& load : scene.loads) {
-    refuse_list(load.where, load.places);
-  }
+  });
 }
 
 // What is understood, but not yet solved.
@@ -269,8 +322,7 @@ void refuse_later(const Scene& scene) {
   if (statics != nullptr && statics->linear) {
     refuse(scene.contacts, "contact", "with geometry = \"linear\"");
   }
-  if (scene.accuracy &&
-      !(scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty())) {
+  if (scene.accuracy && !is_of_shells_alone(scene)) {
     scene.accuracy->places.item.fail_later("an accuracy beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
   }
   for (const SceneLoad& load : scene.loads) {
@@ -285,7 +337,7 @@ void refuse_later(const Scene& scene) {
     if (scene.accuracy) {
       load.places.of("unload").fail_later("an unloaded shape and an accuracy in one run");
     }
-    if (!(scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty())) {
+    if (!is_of_shells_alone(scene)) {
       load.places.of("unload").fail_later("an unloaded shape beside [[solid]], [[rigid]], [[attach]] or [[contact]]");
     }
   }
@@ -295,6 +347,15 @@ void refuse_later(const Scene& scene) {
 void check_scene(const Scene& scene) {
   check_run(scene);
   refuse_later(scene);
+  for_each_section(scene, [&](std::string_view, const auto& keys, const auto& items) {
+    for (const auto& item : items) {
+      check_keys(keys, item, item.places);
+    }
+  });
+  for_each_where(scene, []<typename Item>(const Item& item, const std::optional<Selection>& where) {
+    require(std::is_same_v<Item, SceneFix> || !where || !std::holds_alternative<RigidMotions>(*where),
+            item.places.of("where"), "rigid_motions belongs to [[fix]]: select nodes");
+  });
   check_bodies(scene);
   for (const SceneFix& fix : scene.fixes) {
     check_fix(scene, fix);
@@ -302,18 +363,15 @@ void check_scene(const Scene& scene) {
   for (const SceneSupport& support : scene.supports) {
     check_support(scene, support);
   }
-  const bool finds_factor = std::holds_alternative<ArcLengthRun>(scene.run.kind);
-  const auto refuse_ramp = [&](const Ramp& ramp, const Places& places) {
-    require(!finds_factor || ramp.points.empty(), places.of("ramp"),
-            "arc length finds the load factor, so that nothing can have a ramp over it: remove the ramp");
-  };
-  for (const SceneFix& fix : scene.fixes) {
-    refuse_ramp(fix.ramp, fix.places);
-  }
   for (const SceneLoad& load : scene.loads) {
-    refuse_ramp(load.ramp, load.places);
     check_load(scene, load);
   }
+  for_each_where(scene, [&](const auto& item, const auto&) {
+    if constexpr (requires { item.ramp; }) {
+      require(!std::holds_alternative<ArcLengthRun>(scene.run.kind) || item.ramp.points.empty(), item.places.of("ramp"),
+              "arc length finds the load factor, so that nothing can have a ramp over it: remove the ramp");
+    }
+  });
   check_attachments(scene);
   check_contacts(scene);
   std::set<std::string> names;
@@ -330,8 +388,8 @@ void check_scene(const Scene& scene) {
 
 bool holds_for_finer_meshes(const Scene& scene) {
   const auto listed = [](const auto& item) { return is_list(item.where); };
-  return scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty() &&
-         std::ranges::none_of(scene.fixes, listed) && std::ranges::none_of(scene.loads, listed);
+  return is_of_shells_alone(scene) && std::ranges::none_of(scene.fixes, listed) &&
+         std::ranges::none_of(scene.loads, listed);
 }
 
 }  // namespace tunica

@@ -52,17 +52,12 @@ std::string text_of(const SceneFix& fix, bool alone) {
   return alone ? held : fmt::format("{}: {}", fix.body, held);
 }
 
-struct KindOfRun {
-  Json operator()(const StaticRun& run) const { return of("static", run.linear); }
-  Json operator()(const ArcLengthRun&) const { return of("static", false); }
-  Json operator()(const DynamicRun&) const { return of("dynamic", false); }
-  Json operator()(const FrequencyRun& run) const { return of("frequencies", run.preload.linear); }
-  Json operator()(const BucklingRun&) const { return of("buckling", true); }
-
-  static Json of(const char* kind, bool linear) {
-    return {{"kind", kind}, {"geometry", linear ? "linear" : "nonlinear"}};
-  }
-};
+bool is_linear(const RunSettings& run) {
+  const auto* statics = std::get_if<StaticRun>(&run.kind);
+  const auto* frequencies = std::get_if<FrequencyRun>(&run.kind);
+  return (statics != nullptr && statics->linear) || (frequencies != nullptr && frequencies->preload.linear) ||
+         std::holds_alternative<BucklingRun>(run.kind);
+}
 
 }  // namespace
 
@@ -77,7 +72,7 @@ Json stated_inputs(const Scene& scene) {
   }
   const auto of_pressure = [](const SceneLoad& load) { return std::get<PressureLoad>(load.kind); };
   const auto of_shells = [&](const auto& value) { return common(scene.shells, value); };
-  Json stated = std::visit(KindOfRun(), scene.run.kind);
+  Json stated{{"kind", name_of(scene.run.kind)}, {"geometry", is_linear(scene.run) ? "linear" : "nonlinear"}};
   stated["young_mpa"] = of_shells(
       [](const SceneShell& shell) { return shell.material.young_stated ? Json(shell.material.young) : Json(); });
   stated["poisson"] = of_shells([](const SceneShell& shell) { return Json(shell.material.poisson); });
@@ -95,7 +90,7 @@ Json stated_inputs(const Scene& scene) {
   });
   stated["membrane"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.membrane)); });
   stated["bending"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.bending)); });
-  stated["solver"] = scene.run.solver == Solver::cg ? "cg" : scene.run.solver == Solver::direct ? "direct" : "auto";
+  stated["solver"] = name_of(scene.run.solver);
   stated["fix"] = Json::array();
   const bool alone = scene.shells.size() + scene.solids.size() == 1;
   for (const SceneFix& fix : scene.fixes) {

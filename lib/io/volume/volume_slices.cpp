@@ -261,7 +261,7 @@ VolumeFile read_slices(const fs::path& path, const VolumeOptions& options, const
   if (!options.spacing) {
     throw UsageError(
         fmt::format("{}: a slice stack does not say how large its voxels are: pass --spacing X,Y,Z in mm, "
-                    "for example --spacing 0.5,0.5,1.25",
+                    "for example --spacing 0.5,0.5,1.25 (of the pipeline EXTRACT='--spacing 0.5,0.5,1.25')",
                     path.string()));
   }
   choose(path, "layer", 1, options.layer);

@@ -260,6 +260,16 @@ ContactSystem::Press ContactSystem::press(const Group& group, const Sample& samp
   return press;
 }
 
+double ContactSystem::potential(const Group& group, const Touch& t) const {
+  const double d = group.resolution;
+  const double gap = t.gap / d;
+  const double s = std::max(gap, straight_below);
+  const double below = s - gap;
+  const double law = (1 - s) * (1 - s) / s;
+  return stiffness_[group.contact] * d *
+         (-std::log(s) - 1.5 + 2 * s - s * s / 2 + below * (law + below / 2 * (1 / (s * s) - 1)));
+}
+
 /// What the rest of the rigid body's motion adds to a traction: as if the surface moved back by that.
 Vec3 ContactSystem::rest_of_motion(const Group& group, const Press& press, const Touch& t, const Vec3& x) const {
   if (left_ > 0 && group.point) {
@@ -412,6 +422,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   const FaceMaps& maps = *kept;
   const auto touches = all_touches(maps, near_faces(maps, 0));
   largest_pressure_.assign(contacts_.size(), 0);
+  potential_.assign(contacts_.size(), 0);
   slides_ = false;
   smallest_gap_.assign(contacts_.size(), infinity);
   closest_ = {};
@@ -436,6 +447,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       const Vec3 x = place(group, sample, maps);
       const Press here = press(group, sample, t, x, maps);
       largest_pressure_[group.contact] = std::max(largest_pressure_[group.contact], here.law);
+      potential_[group.contact] += group.weight * sample.area * potential(group, t);
       if (recorded_ != nullptr) {
         record(group, sample, maps, t, here);
       }

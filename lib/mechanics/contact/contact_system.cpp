@@ -21,6 +21,10 @@ constexpr double least_stiffness = 1e-8;  // of the barrier, of Young's modulus:
 /// straight.
 constexpr double stiffness_of_pressure =
     ContactSystem::straight_below / ((1 - ContactSystem::straight_below) * (1 - ContactSystem::straight_below));
+/// Energy of the barrier per area down to where the law is straight, over its stiffness and the resolution: the
+/// integral of (1 - s)^2 / s from there to 1.
+const double energy_of_stiffness = -std::log(ContactSystem::straight_below) - 1.5 + 2 * ContactSystem::straight_below -
+                                   ContactSystem::straight_below * ContactSystem::straight_below / 2;
 constexpr double blunt = 2;               // of what is wanted: above, the barrier is made softer
 constexpr double largest_hardening = 10;  // of the barrier at a time: pressures of iterates may be far too large
 /// Part of both half walls up to which shells may overlap on the way.
@@ -71,7 +75,7 @@ ContactSystem::ContactSystem(const Model& model, Surfaces surfaces, std::vector<
     meetings_.push_back(fmt::format("{} meets {}", name(one), self ? "itself" : name(other)));
   }
   accepted_ = maps_at(rest_);
-  make_sides();
+  make_sides(model);
   refine(*accepted_);
   require_apart(model);
   accept(rest_);
@@ -88,7 +92,7 @@ std::shared_ptr<const FaceMaps> ContactSystem::maps_at(const Configuration& conf
   return last_;
 }
 
-void ContactSystem::make_sides() {
+void ContactSystem::make_sides(const Model& model) {
   const auto wall_of = [&](std::size_t body) {
     double wall = 0;
     std::size_t count = 0;
@@ -101,6 +105,11 @@ void ContactSystem::make_sides() {
     return wall / real(std::max<std::size_t>(1, count));
   };
   const auto young_of = [&](std::size_t body) { return surfaces_.faces[surfaces_.first[body]].young; };
+  const auto density_of = [&](std::size_t body) {
+    const Material& material =
+        model.is_solid(body) ? model.solids[body - model.shells.size()].material : model.shells[body].material;
+    return material.density.value_or(0);
+  };
   std::map<std::size_t, double> walls;  // of the bodies that deform
   for (const Contact& contact : contacts_) {
     for (const ContactParty& party : contact.between) {
@@ -121,15 +130,19 @@ void ContactSystem::make_sides() {
     const Contact& contact = contacts_[c];
     const bool both = !contact.between[0].rigid && !contact.between[1].rigid;
     const bool self = both && contact.between[0].index == contact.between[1].index;
-    double young = infinity, wall = infinity;
+    double young = infinity, wall = infinity, mass = 0;
     for (const ContactParty& party : contact.between) {
       young = party.rigid ? young : std::min(young, young_of(party.index));
       wall = party.rigid ? wall : std::min(wall, walls[party.index]);
+      mass = party.rigid ? mass : std::max(mass, density_of(party.index) * walls[party.index]);
     }
     young_.push_back(young);
+    braking_.push_back(mass / (2 * energy_of_stiffness * contact.resolution * wall));
     stiffness_.push_back(first_stiffness * young);
-    largest_pressure_.push_back(0);
-    pressed_.push_back(0);
+    accepted_stiffness_.push_back(stiffness_.back());
+    for (std::vector<double>* unknown : {&largest_pressure_, &pressed_, &least_, &potential_, &accepted_potential_}) {
+      unknown->push_back(0);
+    }
     for (std::size_t k = 0; k < (self ? 1 : 2); ++k) {
       const ContactParty &own = contact.between[k], &other = contact.between[1 - k];
       if (own.rigid && shapes_[own.index].convex()) {
@@ -354,6 +367,24 @@ void ContactSystem::refine(Group& group) const {
   group.sag = bend / (group.level * group.level);
 }
 
+double ContactSystem::sum_of(const std::vector<double>& values) { return std::reduce(values.begin(), values.end()); }
+
+void ContactSystem::brace(const std::vector<double>& speeds, double length) {
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    if (accepted_potential_[c] > 0) {
+      continue;
+    }
+    double speed = 0;
+    for (const ContactParty& party : contacts_[c].between) {
+      speed += party.rigid
+                   ? (shapes_end_[party.index].position() - shapes_before_[party.index].position()).norm() / length
+                   : speeds[party.index];
+    }
+    least_[c] = braking_[c] * speed * speed;
+    stiffness_[c] = std::max(stiffness_[c], least_[c]);
+  }
+}
+
 bool ContactSystem::harden() {
   bool changed = false;
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
@@ -368,7 +399,8 @@ bool ContactSystem::harden() {
 bool ContactSystem::sharpen() {
   bool changed = harden();
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    const double wanted = std::max(stiffness_of_pressure * largest_pressure_[c], least_stiffness * young_[c]);
+    const double wanted =
+        std::max({stiffness_of_pressure * largest_pressure_[c], least_stiffness * young_[c], least_[c]});
     if (largest_pressure_[c] > 0 && stiffness_[c] > blunt * wanted) {
       stiffness_[c] = wanted;
       changed = true;
@@ -545,6 +577,7 @@ void ContactSystem::set_step(double from, double to, const Configuration& config
     moves = moves || shapes_[r].moves_to(shapes_end_[r]);
   }
   set_left(moves ? 1 : 0);
+  is_driven_ = moves;
   for (Group& group : groups_) {
     for (Sample& sample : group.samples) {
       sample.pressure = -1;
@@ -593,6 +626,10 @@ void ContactSystem::accept(const Configuration& configuration) {
   }
   accepted_ = maps_at(configuration);
   shapes_before_ = shapes_;
+  for (std::size_t c = 0; c < contacts_.size(); ++c) {
+    hardening_ += accepted_potential_[c] * (stiffness_[c] / accepted_stiffness_[c] - 1);
+  }
+  accepted_potential_ = potential_;
   accepted_stiffness_ = stiffness_;
   std::ranges::transform(pressed_, largest_pressure_, pressed_.begin(),
                          [](double a, double b) { return std::max(a, b); });
@@ -653,7 +690,9 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 
 std::vector<double> ContactSystem::memory() const {
   std::vector<double> values = accepted_stiffness_;
-  values.insert(values.end(), pressed_.begin(), pressed_.end());
+  for (const std::vector<double>* kept : {&pressed_, &least_, &accepted_potential_}) {
+    values.insert(values.end(), kept->begin(), kept->end());
+  }
   values.push_back(real(pairs_.size()));
   for (const auto& [i, j] : pairs_) {
     values.insert(values.end(), {real(i), real(j)});
@@ -689,7 +728,9 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
   };
   std::ranges::generate(accepted_stiffness_, next);
   stiffness_ = accepted_stiffness_;
-  std::ranges::generate(pressed_, next);
+  for (std::vector<double>* kept : {&pressed_, &least_, &accepted_potential_}) {
+    std::ranges::generate(*kept, next);
+  }
   std::vector<std::array<Index, 2>> pairs(truncated<std::size_t>(next()));
   for (auto& [i, j] : pairs) {
     i = truncated<Index>(next());

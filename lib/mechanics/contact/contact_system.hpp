@@ -26,7 +26,8 @@
 /// counts as an unknown of its own (a primal-dual interior point method, eliminated at each point): the forces follow
 /// p(g), the tangent takes the pressure that the last one expects. Below a twentieth of d the law goes on as a straight
 /// line, so that surfaces may overlap on the way to a state, and the first touch cuts no step short; a state of rest in
-/// which they do is refused, and the barrier hardened.
+/// which they do is refused, and the barrier hardened. In a motion what is about to touch is stopped by a barrier that
+/// holds its energy, for hardening one that presses already brings energy in (brace()).
 ///
 /// Friction by Coulomb's law with elastic slip: the traction is (friction) p u / e along the slip u since the contact
 /// began, e a thousandth of the wall, and u is cut to e: it also holds at rest, and depends on the path.
@@ -55,6 +56,10 @@ public:
   /// A step of the rigid bodies between two times (load factors in statics). They stand at the first. What comes near
   /// is sampled as finely as its curvature asks in this configuration.
   void set_step(double from, double to, const Configuration& configuration);
+
+  /// Before a step of a motion: where nothing presses yet, the barrier becomes as hard as it takes to stop what comes.
+  /// @param speeds  mm/s, per body that deforms the largest of its nodes; length  s, of the step
+  void brace(const std::vector<double>& speeds, double length);
 
   /// Makes the barrier harder where surfaces overlap.
   /// @return whether that changed anything
@@ -120,14 +125,24 @@ public:
   /// Per contact the largest pressure of any accepted state so far, also of those within a step, MPa.
   [[nodiscard]] const std::vector<double>& pressed() const { return pressed_; }
 
+  /// mJ, of the barrier at the last forces.
+  [[nodiscard]] double potential() const { return sum_of(potential_); }
+  [[nodiscard]] double accepted_potential() const { return sum_of(accepted_potential_); }
+  /// mJ, that changes of the barrier's stiffness have brought in since this was asked for last: they act on what was
+  /// pressing before.
+  double take_hardening() { return std::exchange(hardening_, 0); }
+  /// Whether rigid bodies may do work: whether any moves in the step.
+  [[nodiscard]] bool is_driven() const { return is_driven_; }
+
   struct Pressing {
     double pressure = 0;  ///< MPa
     double area = 0;      ///< mm^2
   };
 
   /// What is kept between steps, so that a run that goes on repeats the uninterrupted one: of the last accepted state
-  /// how stiff the barrier is, what has pressed so far, who may meet, how finely what is near is sampled, and with
-  /// friction how far each sample has slipped. Cost: two numbers per face, with friction five per sample.
+  /// how stiff the barrier is and has to be, its energy, what has pressed so far, who may meet, how finely what is near
+  /// is sampled, and with friction how far each sample has slipped. Cost: two numbers per face, with friction five per
+  /// sample.
   [[nodiscard]] std::vector<double> memory() const;
   /// Puts the contact back to an accepted state.
   /// @param memory  of the same model; configuration, time  of that state
@@ -198,9 +213,10 @@ private:
     Vec3 own = Vec3::Zero(), other = Vec3::Zero();
   };
 
+  static double sum_of(const std::vector<double>& values);
   [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
 
-  void make_sides();
+  void make_sides(const Model& model);
   /// A group of a side where its wall is so thick, mm, of no face yet.
   [[nodiscard]] Group group_of(std::size_t side, double wall) const;
   [[nodiscard]] Group group_of_face(std::size_t side, std::size_t face) const;
@@ -256,6 +272,8 @@ private:
   struct Acting;
   [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x,
                             const FaceMaps& maps) const;
+  /// mJ/mm^2, the integral of the law from this gap on.
+  [[nodiscard]] double potential(const Group& group, const Touch& touch) const;
   [[nodiscard]] Vec3 rest_of_motion(const Group& group, const Press& press, const Touch& touch, const Vec3& x) const;
   struct Recorded {
     std::vector<ContactState> states;
@@ -299,7 +317,13 @@ private:
   std::vector<double> young_;                 ///< MPa, per contact, of the softer body
   std::vector<double> stiffness_;             ///< MPa, per contact, of the barrier
   std::vector<double> accepted_stiffness_;    ///< of the last accepted state
-  std::vector<double> smallest_gap_;          ///< mm, per contact, of the samples at the last forces
+  std::vector<double> braking_;  ///< MPa s^2/mm^2, per contact: the stiffness that stops the heavier wall, by its speed
+  std::vector<double> least_;    ///< MPa, per contact, of the barrier while it presses
+  std::vector<double> potential_;           ///< mJ, per contact, of the last forces
+  std::vector<double> accepted_potential_;  ///< of the last accepted state
+  double hardening_ = 0;                    ///< mJ
+  bool is_driven_ = false;
+  std::vector<double> smallest_gap_;  ///< mm, per contact, of the samples at the last forces
   struct Closest {
     double gap = infinity;
     std::size_t contact = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "tunica/core/names.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/surface/mesh/tet_mesh.hpp"
@@ -20,6 +21,9 @@ enum class Membrane {
   opt,    ///< Felippa's optimal ANDES triangle with drilling freedoms
   adapt,  ///< opt, its higher-order part reduced where the shell curves within an element
 };
+template <>
+inline constexpr auto names_of<Membrane> =
+    std::to_array<Named<Membrane>>({{"cst", Membrane::cst}, {"opt", Membrane::opt}, {"adapt", Membrane::adapt}});
 
 enum class Bending {
   comas,             ///< the paper's 9-term cubic, faithful: depends on the first vertex, converges to a wrong limit
@@ -27,11 +31,19 @@ enum class Bending {
   dkt,               ///< discrete Kirchhoff triangle
   dkt_comas,         ///< four fifths dkt, one fifth comas_consistent
 };
+template <>
+inline constexpr auto names_of<Bending> = std::to_array<Named<Bending>>({{"comas", Bending::comas, "the paper's"},
+                                                                         {"comas-consistent",
+                                                                          Bending::comas_consistent},
+                                                                         {"dkt", Bending::dkt},
+                                                                         {"dkt-comas", Bending::dkt_comas}});
 
 enum class Rest {
   curved,  ///< the shell's own curvature is stress-free
   flat,    ///< the facets are stress-free and flat (classical benchmarks)
 };
+template <>
+inline constexpr auto names_of<Rest> = std::to_array<Named<Rest>>({{"curved", Rest::curved}, {"flat", Rest::flat}});
 
 /// Isotropic linear elasticity, in the co-rotated frame.
 struct Material {
@@ -59,6 +71,9 @@ enum class SolidLaw {
   corotational,  ///< the paper's: linear elasticity in the frame that follows each tetrahedron; for small strains
   neo_hookean,   ///< for what is crushed
 };
+template <>
+inline constexpr auto names_of<SolidLaw> = std::to_array<Named<SolidLaw>>({{"corotational", SolidLaw::corotational},
+                                                                           {"neo-hookean", SolidLaw::neo_hookean}});
 
 /// A body of linear tetrahedra.
 struct SolidBody {
@@ -79,23 +94,27 @@ struct Table {
 };
 
 struct RigidSphere {
+  static constexpr std::string_view name = "sphere";
   Table<Vec3> centre;    ///< mm
   Table<double> radius;  ///< mm
 };
 /// All points within `radius` of the line.
 struct RigidCapsule {
+  static constexpr std::string_view name = "capsule";
   Table<Vec3> from, to;  ///< mm
   Table<double> radius;
 };
 /// With flat ends at right angles to the line.
 struct RigidCylinder {
+  static constexpr std::string_view name = "cylinder";
   Table<Vec3> from, to;
   Table<double> radius;
 };
 /// The half-space below a plane.
 struct RigidPlane {
-  Table<Vec3> point;  ///< mm
-  Vec3 normal;        ///< unit; away from the body
+  static constexpr std::string_view name = "plane";
+  Table<Vec3> point;            ///< mm
+  Vec3 normal = Vec3::UnitZ();  ///< unit; away from the body
 };
 /// A closed surface, its normals outward.
 struct RigidMesh {
@@ -132,6 +151,9 @@ struct Attachment {
   Side side = Side::middle;  ///< of a shell: the face of the wall on which the nodes lie
   std::string said_at{};
 };
+template <>
+inline constexpr auto names_of<Attachment::Side> = std::to_array<Named<Attachment::Side>>(
+    {{"inner", Attachment::Side::inner}, {"outer", Attachment::Side::outer}, {"middle", Attachment::Side::middle}});
 
 /// A body that deforms, by its number, or a rigid one.
 struct ContactParty {
@@ -193,6 +215,7 @@ std::vector<char> triangles_within(const ShellMesh& mesh, const std::vector<Inde
 
 /// Pressure along the outward normals (positive: along them).
 struct PressureLoad {
+  static constexpr std::string_view name = "pressure";
   double value = 0;                   ///< MPa
   bool follower = true;               ///< turns and grows with the surface
   std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged: the load begins there
@@ -206,22 +229,27 @@ struct PressureLoad {
   }
 };
 struct ForceLoad {
+  static constexpr std::string_view name = "force";
   std::vector<Index> nodes;
   Vec3 total = Vec3::Zero();  ///< N, shared equally by the nodes
 };
 /// About fixed world axes; it does work on the spin.
 struct MomentLoad {
+  static constexpr std::string_view name = "moment";
   std::vector<Index> nodes;
   Vec3 total = Vec3::Zero();  ///< N mm, shared equally by the nodes
 };
 struct EdgeLoad {
+  static constexpr std::string_view name = "edge";
   std::vector<std::array<Index, 2>> edges;
   Vec3 per_length = Vec3::Zero();  ///< N / mm, integrated consistently
 };
 struct AreaLoad {
+  static constexpr std::string_view name = "area";
   Vec3 per_area = Vec3::Zero();  ///< MPa, fixed direction, on the whole body
 };
 struct GravityLoad {
+  static constexpr std::string_view name = "gravity";
   Vec3 acceleration = Vec3::Zero();  ///< mm / s^2
 };
 
@@ -270,11 +298,18 @@ enum class Solver {
   direct,  ///< sparse factorisation (ordering by CHOLMOD), symbolic analysis once
   automatic,
 };
+template <>
+inline constexpr auto names_of<Solver> =
+    std::to_array<Named<Solver>>({{"auto", Solver::automatic}, {"cg", Solver::cg}, {"direct", Solver::direct}});
 
 enum class Integrator {
   backward_euler,     ///< the paper's: first order, strong numerical damping
   generalised_alpha,  ///< second order, damping of what is too fast for the step as chosen
 };
+template <>
+inline constexpr auto names_of<Integrator> =
+    std::to_array<Named<Integrator>>({{"backward-euler", Integrator::backward_euler, "the paper's"},
+                                      {"generalised-alpha", Integrator::generalised_alpha}});
 
 struct Damping {
   double mass = 0;       ///< 1 / s
@@ -282,12 +317,14 @@ struct Damping {
 };
 
 struct StaticRun {
+  static constexpr std::string_view name = "static";
   bool linear = false;               ///< one solve with the initial tangent
   std::vector<double> load_factors;  ///< increasing; the last is usually 1
 };
 
 /// The whole path of equilibria from the reference on, through limit points: the load factor is found, not given.
 struct ArcLengthRun {
+  static constexpr std::string_view name = StaticRun::name;
   std::size_t max_steps = 200;
   double first_factor = 0.1;         ///< change of the load factor in the first step; the others find their length
   std::optional<double> max_factor;  ///< the path ends where the load factor reaches this, up or down
@@ -302,6 +339,7 @@ struct ArcLengthRun {
 /// Natural frequencies about the reference, or, where there are loads or prescribed displacements, about the state of
 /// rest under them.
 struct FrequencyRun {
+  static constexpr std::string_view name = "frequencies";
   std::size_t count = 10;
   StaticRun preload;  ///< how that state is found
 };
@@ -309,10 +347,12 @@ struct FrequencyRun {
 /// Factors of the loads (and prescribed displacements) at which the stiffness about the linear solution under them,
 /// growing in proportion, becomes singular.
 struct BucklingRun {
+  static constexpr std::string_view name = "buckling";
   std::size_t count = 10;
 };
 
 struct DynamicRun {
+  static constexpr std::string_view name = "dynamic";
   double duration = 0;  ///< s
   double step = 0;      ///< s
   Damping damping;

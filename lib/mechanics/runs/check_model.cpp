@@ -185,22 +185,21 @@ void check_inner_face(const ShellBody& body) {
 
 /// All numbers of a load.
 Vec3 numbers_of(const Load& load) {
-  if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
-    return {pressure->value, pressure->imaged_at.value_or(0), 0};
-  }
-  if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
-    return force->total;
-  }
-  if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
-    return moment->total;
-  }
-  if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
-    return edge->per_length;
-  }
-  if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
-    return area->per_area;
-  }
-  return std::get<GravityLoad>(load.kind).acceleration;
+  return std::visit(
+      [](const auto& kind) -> Vec3 {
+        if constexpr (requires { kind.imaged_at; }) {
+          return {kind.value, kind.imaged_at.value_or(0), 0};
+        } else if constexpr (requires { kind.total; }) {
+          return kind.total;
+        } else if constexpr (requires { kind.per_length; }) {
+          return kind.per_length;
+        } else if constexpr (requires { kind.per_area; }) {
+          return kind.per_area;
+        } else {
+          return kind.acceleration;
+        }
+      },
+      load.kind);
 }
 
 void check_rigid(const RigidBody& body) {
@@ -216,6 +215,14 @@ void check_rigid(const RigidBody& body) {
       refuse(body.said_at, body.name, "an axis of its shape or motion has no unit vector, or no finite point");
     }
   };
+  const auto refuse_negative = [&](const auto& shape) {
+    if constexpr (requires { shape.radius; }) {
+      if (std::ranges::any_of(shape.radius.points, [](const auto& point) { return point.second < 0; })) {
+        refuse(body.said_at, body.name, "its radius is negative somewhere");
+      }
+    }
+  };
+  std::visit(refuse_negative, body.shape);
   if (const auto* plane = std::get_if<RigidPlane>(&body.shape)) {
     check_axis(Vec3::Zero(), plane->normal);
   } else if (const auto* mesh = std::get_if<RigidMesh>(&body.shape)) {
@@ -275,7 +282,7 @@ void check_numbers(const Vec3& numbers, const Ramp& ramp, const std::string& of)
 }
 
 void check_selections(const Model& model) {
-  const auto check = [&](std::size_t body, const std::vector<Index>& nodes, const char* what) {
+  const auto check = [&](std::size_t body, const std::vector<Index>& nodes, std::string_view what) {
     if (body >= model.body_count()) {
       throw InputError(fmt::format("a {} names body {}, but there are {}", what, body, model.body_count()));
     }
@@ -319,19 +326,22 @@ void check_selections(const Model& model) {
   for (const Load& load : model.loads) {
     check(load.body, {0}, "load");
     check_numbers(numbers_of(load), load.ramp, called(load.said_at, "this load on " + model.name_of(load.body)));
-    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && !pressure->nodes.empty()) {
-      check(load.body, pressure->nodes, "pressure");
-    } else if (const auto* force = std::get_if<ForceLoad>(&load.kind)) {
-      check(load.body, force->nodes, "force");
-    } else if (const auto* moment = std::get_if<MomentLoad>(&load.kind)) {
-      check(load.body, moment->nodes, "moment");
-    } else if (const auto* edge = std::get_if<EdgeLoad>(&load.kind)) {
-      std::vector<Index> ends;
-      for (const auto& e : edge->edges) {
-        ends.insert(ends.end(), e.begin(), e.end());
-      }
-      check(load.body, ends, "edge load");
-    } else if (std::holds_alternative<GravityLoad>(load.kind) && !material_of(model, load.body).density) {
+    std::visit(
+        [&]<typename Kind>(const Kind& kind) {
+          if constexpr (requires { kind.nodes; }) {
+            if (!std::is_same_v<Kind, PressureLoad> || !kind.nodes.empty()) {
+              check(load.body, kind.nodes, Kind::name);
+            }
+          } else if constexpr (requires { kind.edges; }) {
+            std::vector<Index> ends;
+            for (const auto& edge : kind.edges) {
+              ends.insert(ends.end(), edge.begin(), edge.end());
+            }
+            check(load.body, ends, "edge load");
+          }
+        },
+        load.kind);
+    if (std::holds_alternative<GravityLoad>(load.kind) && !material_of(model, load.body).density) {
       refuse(model, load.body, "gravity acts on it, but it has no density");
     }
   }
@@ -625,6 +635,7 @@ ShellSystem& System::parts() const {
 }
 
 std::optional<double> System::prestress_residual() const { return parts().prestress_residual; }
+std::optional<bool> System::rests_as_imaged() const { return parts().rests_as_imaged; }
 
 void check_model(const Model& model, const RunSettings& settings) { (void)make_checked_system(model, settings); }
 

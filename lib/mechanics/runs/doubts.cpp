@@ -373,7 +373,7 @@ bool only_held_nodes_bear(const Shared& load, const std::vector<std::array<bool,
 
 bool is_zero(const Load& load) {
   if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
-    return pressure->value == 0;
+    return pressure->value == 0 && pressure->imaged_at.value_or(0) == 0;  // else the wall shrinks
   }
   if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
     return area->per_area.isZero(0);

@@ -201,6 +201,65 @@ private:
   double length_before_ = 0;          ///< s
 };
 
+/// mm/s, the largest of each body's nodes.
+std::vector<double> speeds_of_bodies(const Model& model, const Rates& rates) {
+  std::vector<double> speeds(model.body_count(), 0);
+  for (std::size_t b = 0; b < speeds.size(); ++b) {
+    const std::size_t first = model.first_node(b);
+    for (std::size_t i = first; i < first + model.vertices_of(b).size(); ++i) {
+      speeds[b] = std::max(speeds[b], rates.velocity.segment<3>(first_freedom(i)).norm());
+    }
+  }
+  return speeds;
+}
+
+/// Energy that contact takes and gives. What its barrier takes and gives back is stored. Of the rest, the work of rigid
+/// bodies that move is brought in, and what friction takes is damped; where neither is, time integration loses it, or
+/// gains from it.
+class ContactWork {
+public:
+  explicit ContactWork(const ShellSystem& system)
+      : contact_(system.contact.get()),
+        rubs_(
+            std::ranges::any_of(system.model->contacts, [](const Contact& contact) { return contact.friction > 0; })) {}
+
+  /// Forces at the end of a step, which are those at the start of the next; of size zero: nothing may touch.
+  void keep(const VectorX& forces, const FreeMask& free) {
+    touched_ = std::exchange(touching_, forces);
+    if (touching_.size() > 0) {
+      mask(free, touching_);
+    }
+  }
+
+  struct Work {
+    double brought = 0, damped = 0;  ///< mJ
+  };
+
+  /// Over a step that is accepted, by the mean of its ends. @param change  displacements and rotations
+  Work over(const VectorX& change) {
+    if (contact_ == nullptr) {
+      return {};
+    }
+    const double before = std::exchange(stored_, contact_->potential());
+    const double rest = 0.5 * (touched_ + touching_).dot(change) + stored_ - before - contact_->take_hardening();
+    return contact_->is_driven() ? Work{rest, 0} : Work{0, rubs_ ? -std::min(rest, 0.0) : 0};
+  }
+
+  [[nodiscard]] double stored() const { return stored_; }
+  [[nodiscard]] const VectorX& touching() const { return touching_; }
+
+  void recall(const VectorX& touching) {
+    touching_ = touching;
+    stored_ = contact_ == nullptr ? 0 : contact_->accepted_potential();
+  }
+
+private:
+  ContactSystem* contact_;
+  bool rubs_;  ///< some contact has friction
+  VectorX touched_, touching_;
+  double stored_ = 0;  ///< mJ
+};
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Damping is alpha M and, in each element's own frame, beta K times the rate of its deformation: a rigid motion
 /// is not damped by beta.
@@ -216,6 +275,7 @@ public:
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
         held_(along_world(system.held)),
+        contact_work_(system),
         part_(run.step) {
     solver_.emplace(system, settings);
     if (system.prestress_residual) {
@@ -315,6 +375,7 @@ public:
     result.acceleration = motion.rates.acceleration;
     result.auxiliary = motion.rates.auxiliary;
     result.acting = acting_;
+    result.touching = contact_work_.touching();
     result.part = part_;
     result.at_rest = at_rest_;
     damping_.remember(result);
@@ -330,6 +391,11 @@ public:
     take(memory.acceleration, "the acceleration", motion.rates.acceleration);
     take(memory.auxiliary, "the integrator", motion.rates.auxiliary);
     take(memory.acting, "the acting forces", acting_);
+    VectorX touching;
+    if (system_.contact) {
+      take(memory.touching, "the forces of contact", touching);
+    }
+    contact_work_.recall(touching);
     deformation_.clear();
     work_ = damped_ = 0;
     part_ = memory.part;
@@ -344,7 +410,7 @@ public:
 
   /// Closes the balance of energy after a step.
   void balance_energy(std::size_t step, double time, const Motion& motion, EnergyBalance& energy) {
-    const double stored = forces_.energy + kinetic_energy(motion.rates.velocity);
+    const double stored = forces_.energy + kinetic_energy(motion.rates.velocity) + contact_work_.stored();
     energy.work += std::exchange(work_, 0);
     energy.damped += std::exchange(damped_, 0);
     energy.lost = energy.work - energy.damped - stored;
@@ -428,6 +494,9 @@ private:
     keep_acting(motion);
     accept_contact(system_, motion.configuration);
     work_ += 0.5 * (acted + acting_).dot(change_);
+    const auto [brought, damped] = contact_work_.over(change_);
+    work_ += brought;
+    damped_ += damped;
     const VectorX braked = std::move(braking_);
     braking_ = run_.damping.mass * mass_.cwiseProduct(motion.rates.velocity);
     damped_ += 0.5 * (braked + braking_).dot(change_);
@@ -435,9 +504,13 @@ private:
     deformation_ = forces_.deformation;
   }
 
-  /// Loads, and on held freedoms what moves them.
+  /// Loads, and on held freedoms what moves them; apart from these, contact.
   void keep_acting(const Motion& motion) {
     acting_ = forces_.external;
+    if (forces_.contact.size() > 0) {
+      acting_ -= forces_.contact;
+    }
+    contact_work_.keep(forces_.contact, solver_->free());
     mask(solver_->free(), acting_);
     VectorX moving =
         forces_.internal + mass_.cwiseProduct(motion.rates.acceleration + run_.damping.mass * motion.rates.velocity);
@@ -475,6 +548,9 @@ private:
     };
     begin_contact(system_, settings_, s.time + from * s.length, s.time + to * s.length, configuration, solver_,
                   matrix_);
+    if (system_.contact) {
+      system_.contact->brace(speeds_of_bodies(model_, s.rates_before), s.length);
+    }
     NewtonResult result =
         newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;
@@ -557,10 +633,11 @@ private:
   Forces forces_;
   std::vector<ElementState> deformation_;  ///< at the start of the step
   VectorX change_;                         ///< displacements and rotations of the last part of a step
-  VectorX acting_;                         ///< at the start of the step
-  VectorX borne_;                          ///< forces of the reference's prestress; empty: it has none
-  VectorX braking_;                        ///< forces of damping by mass, likewise
-  double work_ = 0;                        ///< mJ, since energies were last balanced
+  VectorX acting_;                         ///< at the start of the step, without contact
+  ContactWork contact_work_;
+  VectorX borne_;    ///< forces of the reference's prestress; empty: it has none
+  VectorX braking_;  ///< forces of damping by mass, likewise
+  double work_ = 0;  ///< mJ, since energies were last balanced
   double damped_ = 0;
   double tolerance_ = 0;  ///< mm, of error control; 0: none
   double part_ = 0;       ///< s: length of the next part under error control

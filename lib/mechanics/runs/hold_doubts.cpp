@@ -3,12 +3,11 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/places.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
-#include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/mechanics/runs/meeting_walls.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
-#include "tunica/surface/mesh/self_intersections.hpp"
 
 #include <fmt/format.h>
 
@@ -22,12 +21,6 @@
 
 namespace tunica {
 namespace {
-
-std::string named(const std::string& said_at, const std::string& name) {
-  return said_at.empty() ? name : said_at + ": " + name;
-}
-
-std::string where(const Vec3& p) { return fmt::format("({:.4g}, {:.4g}, {:.4g}) mm", p.x(), p.y(), p.z()); }
 
 /// The largest pressure on a shell at the end of the load, with its sign, MPa.
 double pressure_on(const Model& model, std::size_t body) {
@@ -250,98 +243,12 @@ Swing swing_of(const ShellMesh& mesh, const std::vector<Index>& nodes, const std
   return swing;
 }
 
-/// All shells as one mesh, displaced by a state; where there is none, as they are.
-/// @return empty corner normals where some body has none
-ShellMesh joined_shells(const Model& model, const State* state) {
-  ShellMesh all;
-  const bool curved = std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.curved; });
-  for (std::size_t b = 0; b < model.shells.size(); ++b) {
-    const ShellMesh& mesh = model.shells[b].mesh;
-    const std::size_t first = model.first_node(b);
-    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-      all.vertices.push_back(mesh.vertices[i] +
-                             (state == nullptr ? Vec3(Vec3::Zero()) : state->displacement[first + i]));
-    }
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      std::array<Index, 3> corners{};
-      std::array<Vec3, 3> normals;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index node = mesh.triangles[t][k];
-        corners[k] = narrow<Index>(first + node);
-        normals[k] = curved ? mesh.normal(t, k) : Vec3(Vec3::Zero());
-        if (curved && state != nullptr) {
-          normals[k] = exponential(state->rotation[first + node]) * normals[k];
-        }
-      }
-      all.triangles.push_back(corners);
-      if (curved) {
-        all.corner_normals.push_back(normals);
-      }
-    }
-  }
-  return all;
-}
-
-/// But those of neighbours: that these fold over each other is an element's failure, which the run itself tells.
-std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
-  if (!shells.corner_normals.empty()) {
-    try {
-      return crossing_patches(shells, false);
-    } catch (const InputError&) {  // folded over: there is no patch
-    }
-  }
-  std::vector<std::array<Index, 2>> crossings = find_self_intersections(flat_facets(shells));
-  std::erase_if(crossings, [&](const auto& pair) { return share_a_node(shells, pair); });
-  return crossings;
-}
-
-/// Bodies that pass through each other or themselves before anything moves. Contact refuses those that it holds apart.
-void doubt_bodies(const Model& model, std::vector<Warning>& found) {
-  const ShellMesh all = joined_shells(model, nullptr);
-  const auto body_of = [&](Index triangle) {
-    const auto node = static_cast<std::size_t>(all.triangles[triangle][0]);
-    std::size_t body = 0;
-    while (body + 1 < model.shells.size() && model.first_node(body + 1) <= node) {
-      ++body;
-    }
-    return body;
-  };
-  std::map<std::array<std::size_t, 2>, std::pair<std::size_t, Vec3>> pairs;  // of bodies: how many shells, and where
-  for (const auto& [one, other] : crossings_of(all)) {
-    const auto [a, b] = std::minmax({body_of(one), body_of(other)});
-    const bool tied = std::ranges::any_of(model.attachments, [&, a = a, b = b](const Attachment& tie) {
-      return std::minmax({tie.body, tie.to}) == std::pair(a, b);
-    });
-    if (!tied) {
-      ++pairs.try_emplace({a, b}, 0, all.vertices[all.triangles[one][0]]).first->second.first;
-    }
-  }
-  for (const auto& [bodies, what] : pairs) {
-    if (bodies[0] == bodies[1]) {
-      found.push_back(
-          {Weight::major, "surface crosses itself",
-           fmt::format(
-               "{}: passes through itself in {} pairs of shells, the first at {}: what is said of the wall around "
-               "holds for no body: mend the surface, or take more shells",
-               named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), what.first, where(what.second))});
-      continue;
-    }
-    found.push_back(
-        {Weight::major, "walls through each other",
-         fmt::format("{} and {} pass through each other in {} pairs of shells, the first at {}, and nothing "
-                     "holds them apart: move them apart and add a [[contact]] between them",
-                     named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), model.shells[bodies[1]].name,
-                     what.first, where(what.second))});
-  }
-}
-
 }  // namespace
 
 std::vector<Warning> doubts_of_ends(const Model& model) {
   require_valid(model);
   constexpr double least_roundness = 0.05;  // of the area that a circle as long as the rim encloses
-  std::vector<Warning> found;
-  doubt_bodies(model, found);
+  std::vector<Warning> found = doubts_of_meeting_walls(model);
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     doubt_gaps(model, b, found);
@@ -424,41 +331,6 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
     }
   }
   return found;
-}
-
-CrossingWatch::CrossingWatch(const Model& model) : model_(model) { require_valid(model); }
-
-void CrossingWatch::see(const State& state) {
-  require_valid(model_, state);
-  if (found_ || model_.shells.empty()) {
-    return;
-  }
-  const ShellMesh now = joined_shells(model_, &state);
-  const std::vector<std::array<Index, 2>> crossings = crossings_of(now);
-  if (crossings.empty()) {
-    return;
-  }
-  if (!before_) {
-    before_ = crossings_of(joined_shells(model_, nullptr));
-  }
-  std::vector<std::array<Index, 2>> made;
-  std::ranges::set_difference(crossings, *before_, std::back_inserter(made));
-  if (made.empty()) {
-    return;
-  }
-  Vec3 middle = Vec3::Zero();
-  for (const Index node : now.triangles[made.front()[0]]) {
-    middle += now.vertices[node] / 3;
-  }
-  const std::string when = state.velocity.empty() ? fmt::format("at load factor {:.3g}", state.load_factor)
-                                                  : fmt::format("at {:.3g} s", state.time);
-  found_ = {
-      Weight::major, "walls through each other",
-      fmt::format("{}: {} the wall passes through itself or another in {} pairs of shells{}, the first at {}: what "
-                  "is said from there on holds for no body: add a [[contact]] between what meets, the same body "
-                  "twice where it is itself, or lower the load",
-                  named(model_.shells.front().said_at, model_.shells.front().name), when, made.size(),
-                  before_->empty() ? "" : " more than without load", where(middle))};
 }
 
 std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings) {

@@ -14,28 +14,12 @@ namespace tunica {
 /// Open ends of a shell under pressure that nothing holds and no force pulls: what continues the vessel there would
 /// pull with the pressure times the lumen. And rims that slide in planes that the wall meets at a slant, where it would
 /// pull in the plane as well (slant_of_rim()). And edges that run beside each other within half of the wall, where
-/// parts should join; and bodies that pass through each other or themselves. Cost: that of crossing_patches().
+/// parts should join; and what doubts_of_meeting_walls() finds, at its cost.
 std::vector<Warning> doubts_of_ends(const Model& model);
 
 /// Swings of a state: the rigid motion nearest to what a connected piece under pressure does makes more than half of
 /// its largest displacement, and more than half of its wall's thickness, and nothing prescribes it. Cost: linear.
 std::vector<Warning> swings_of(const Model& model, const State& state);
-
-/// Looks for shells that pass through each other, whole pairs of curved surfaces, which do not in the reference; by
-/// their facets where these are all that is known, or a surface folds over. The model must outlive it.
-class CrossingWatch {
-public:
-  explicit CrossingWatch(const Model& model);
-
-  /// Nothing once some are found. Cost: crossing_patches().
-  void see(const State& state);
-  [[nodiscard]] const std::optional<Warning>& found() const { return found_; }
-
-private:
-  const Model& model_;
-  std::optional<std::vector<std::array<Index, 2>>> before_;  ///< those of the reference, once they are wanted
-  std::optional<Warning> found_;
-};
 
 /// A static run under suction above a fifth of the load at which the perfect shell buckles by the linear theory: real
 /// shells, never perfect, yield at a part of it (a sphere with a dimple one wall deep at .36). Nothing where shells are

@@ -15,7 +15,10 @@ public:
   explicit ContactTerm(std::shared_ptr<ContactSystem> contact) : contact_(std::move(contact)) {}
 
   bool add(const ShellSystem& /*system*/, const Instant& at, Forces& forces, BlockMatrix* tangent) const override {
-    return contact_->add(at.configuration, forces.external, tangent);
+    forces.contact.setZero(forces.external.size());
+    const bool valid = contact_->add(at.configuration, forces.contact, tangent);
+    forces.external += forces.contact;
+    return valid;
   }
   [[nodiscard]] bool acts_in_image() const override { return false; }
 

@@ -25,6 +25,9 @@ namespace {
 constexpr double shown_amplitude = 0.01;
 /// Work of a rigid motion below this part of the terms it is summed from is zero.
 constexpr double no_work = 1e-10;
+/// Likewise below this part of what the loads would do that do not turn with a body. What their balance lacks, the
+/// tolerance of Newton's method, is less by orders of magnitude.
+constexpr double no_work_of_loads = 1e-4;
 /// Beyond this strain or rotation (rad) a linear solution means nothing, nor does a factor of it.
 constexpr double largest_linear_strain = 0.2, largest_linear_rotation = 1;
 /// The shift of a free body, of its lowest eigenvalue.
@@ -249,12 +252,20 @@ double small_shift(const ShellSystem& system) {
   return shift;
 }
 
+/// About which a model vibrates.
+struct RestingState {
+  Configuration configuration;
+  BlockMatrix stiffness;
+  VectorX external;  ///< forces of the loads; of size zero: none act
+};
+
 /// Rigid motions against which nothing works: they have no frequency.
-std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configuration& configuration,
-                                      const BlockMatrix& stiffness) {
+std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const RestingState& rest) {
+  const BlockMatrix& stiffness = rest.stiffness;
+  const double size = longest_side(system);
   std::vector<VectorX> idle;
   for (const Piece& piece : system.pieces) {
-    const std::vector<VectorX> modes = free_rigid_modes(system, piece, configuration);
+    const std::vector<VectorX> modes = free_rigid_modes(system, piece, rest.configuration);
     if (modes.empty()) {
       continue;
     }
@@ -264,7 +275,11 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     VectorX diagonal(first_freedom(system.node_count()));
     for (std::size_t i = 0; i < system.node_count(); ++i) {
       diagonal.segment<6>(first_freedom(i)) =
-          stiffness.block(stiffness.find(narrow<Index>(i), narrow<Index>(i))).diagonal().cwiseAbs();
+          no_work * stiffness.block(stiffness.find(narrow<Index>(i), narrow<Index>(i))).diagonal().cwiseAbs();
+    }
+    for (const Index i : rest.external.size() > 0 ? piece.nodes : std::vector<Index>()) {
+      const double force = rest.external.segment<3>(first_freedom(i)).norm();
+      diagonal.segment<3>(first_freedom(i)).array() += no_work_of_loads * force / size;
     }
     VectorX product;
     for (Eigen::Index a = 0; a < count; ++a) {
@@ -276,7 +291,7 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
     }
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (work + work.transpose()), terms);
     for (Eigen::Index k = 0; k < count; ++k) {
-      if (std::abs(eigen.eigenvalues()[k]) < no_work) {
+      if (std::abs(eigen.eigenvalues()[k]) < 1) {
         VectorX mode = VectorX::Zero(first_freedom(system.node_count()));
         for (Eigen::Index a = 0; a < count; ++a) {
           mode += eigen.eigenvectors()(a, k) * modes[a];
@@ -288,16 +303,18 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const Configura
   return idle;
 }
 
-/// The tangent about which a model vibrates; `configuration` becomes the state of rest.
-BlockMatrix stiffness_at_rest(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run,
-                              Configuration& configuration) {
+RestingState rest_of(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run) {
   const Model& model = *system.model;
-  BlockMatrix stiffness = system.pattern;
+  RestingState rest{reference_configuration(system), system.pattern, {}};
+  auto& [configuration, stiffness, external] = rest;
   if (model.loads.empty() && system.prescribed.empty()) {
     linear_stiffness(system, stiffness);
-    return stiffness;
+    return rest;
   }
+  Forces forces;
   if (run.preload.linear) {
+    evaluate(system, {configuration, load_factors(model, true, 1)}, forces, nullptr);
+    external = forces.external;
     reference_tangent(system, stiffness);
     const VectorX solution = linear_solution(system, settings);
     if (solution.squaredNorm() > 0) {
@@ -306,18 +323,24 @@ BlockMatrix stiffness_at_rest(ShellSystem& system, const RunSettings& settings, 
         stiffness.values[k] += change.values[k];
       }
     }
-    return stiffness;
+    return rest;
+  }
+  // What is left out of balance works on a body that is free to turn: its rotations are to be eigenvectors to more
+  // digits than the modes.
+  RunSettings exact = settings;
+  if (std::ranges::any_of(system.pieces, &Piece::balanced)) {
+    exact.converge = std::min(settings.converge, 1e-12);
   }
   State last;
-  run_static(system, settings, run.preload, [&](const State& state) { last = state; }, {}, {});
+  run_static(system, exact, run.preload, [&](const State& state) { last = state; }, {}, {});
   configuration.displacement = last.displacement;
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     configuration.rotation[i] = exponential(last.rotation[i]);
   }
-  Forces forces;
   evaluate(system, {configuration, load_factors(model, true, last.load_factor)}, forces, &stiffness);
+  external = forces.external;
   symmetrise(stiffness);
-  return stiffness;
+  return rest;
 }
 
 }  // namespace
@@ -328,20 +351,19 @@ Summary run_frequencies(ShellSystem& system, const RunSettings& settings, const 
   const auto start = Clock::now();
   Summary summary;
   on_state(reference_state(system, summary));
-  Configuration configuration = reference_configuration(system);
-  BlockMatrix stiffness = stiffness_at_rest(system, settings, run, configuration);
+  RestingState rest = rest_of(system, settings, run);
   advance(progress, 0.3);
   release_rigid_motion_supports(system);
   const FreeMask free = free_freedoms(system);
   summary.dof = narrow<std::size_t>(std::count(free.begin(), free.end(), true));
 
-  const std::vector<VectorX> rigid = idle_rigid_modes(system, configuration, stiffness);
+  const std::vector<VectorX> rigid = idle_rigid_modes(system, rest);
   require_modes(run.count, summary.dof - rigid.size());
   const VectorX mass = lumped_masses(system);
   // Where a body is free the first shift is only known to be small against the lowest value; one that is near it keeps
   // the rigid motions, which the inverse enlarges, from drowning the modes in round-off.
   ShiftedPencil pencil(
-      system, free, std::move(stiffness), [&](BlockMatrix& matrix, double change) { add(matrix, -change, mass); },
+      system, free, std::move(rest.stiffness), [&](BlockMatrix& matrix, double change) { add(matrix, -change, mass); },
       [&](const VectorX& x, VectorX& y) { y = mass.cwiseProduct(x); });
   const auto move_to = [&](double shift) {
     const DirectSolver::Factored factored = pencil.move_to(shift);

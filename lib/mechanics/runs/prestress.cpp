@@ -42,6 +42,23 @@ void hold_loose_pieces(ShellSystem& system, const std::vector<double>& factors) 
   }
 }
 
+/// Whether Young's modulus of every body is known: else how stiff the wall is says nothing.
+bool has_stiffness(const Model& model) {
+  return std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.material.young_stated; });
+}
+
+/// Whether the reference is a stable state of rest under the pressures of the image: its tangent is positive definite.
+bool rests(ShellSystem& system, RunSettings settings, const std::vector<double>& factors) {
+  settings.solver = Solver::direct;
+  BlockMatrix tangent = system.pattern;
+  Forces forces;
+  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
+  VectorX none = VectorX::Zero(first_freedom(system.node_count()));
+  condense(system, reference_configuration(system), none, &tangent);
+  symmetrise(tangent);
+  return TangentSolver(system, settings).solve(tangent, VectorX::Zero(none.size()), none).positive_definite;
+}
+
 }  // namespace
 
 void add_stress(ShellSystem& system, const VectorX& moved) {
@@ -86,9 +103,12 @@ void add_prestress(ShellSystem& system, const RunSettings& settings) {
   const double residual = solver.residual(solution);
   add_stress(system, solution.moved);
   system.prestress_residual = residual;
-  system.held = held;
   system.terms = terms;
   system.bed = bed;
+  if (contact == nullptr && has_stiffness(model)) {
+    system.rests_as_imaged = rests(system, exact, factors);
+  }
+  system.held = held;
   system.contact = contact;
 }
 

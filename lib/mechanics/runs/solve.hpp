@@ -103,7 +103,8 @@ struct MotionMemory {
   Eigen::VectorXd velocity;      ///< mm/s, rad/s
   Eigen::VectorXd acceleration;  ///< mm/s^2, rad/s^2
   Eigen::VectorXd auxiliary;     ///< of the integrator (time_scheme.hpp)
-  Eigen::VectorXd acting;        ///< N, N mm: forces at the end of the last step
+  Eigen::VectorXd acting;        ///< N, N mm: forces at the end of the last step, without contact
+  Eigen::VectorXd touching;      ///< likewise, of contact; none where nothing may touch
   Eigen::VectorXd last_change;   ///< mm, rad; none before two steps
   double part = 0;               ///< s: the next part of a step
   bool at_rest = false;

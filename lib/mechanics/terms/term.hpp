@@ -31,6 +31,7 @@ struct Movement {
 struct Forces {
   VectorX internal;  ///< 6 per node: force, moment
   VectorX external;
+  VectorX contact;   ///< what of `external` is contact; of size zero: nothing touches anything
   VectorX inertia;   ///< what moving takes, with damping by mass; zero at rest
   double noise = 0;  ///< N: norm of what round-off makes of these forces, beside round_off()
   double energy = 0;

@@ -7,6 +7,7 @@ namespace tunica::report::embedded {
 
 std::string_view report_js();
 std::string_view report_css();
+std::string_view report_html();
 std::string_view LICENCES_txt();
 
 }  // namespace tunica::report::embedded

@@ -5,10 +5,11 @@
 #include <string_view>
 #include <vector>
 
-/// HTML that no name of a file can break out of: what is put into it is text, unless it is Markup already.
+/// HTML that no name of a file can break out of: what is put into it is text, unless it is Markup already. The HTML
+/// itself stands in web/src/report.html.
 namespace tunica::report {
 
-/// HTML as it stands. Only html() and what joins its results make some.
+/// HTML as it stands. Only part() and what joins its results make some.
 struct Markup {
   std::string text = {};
 
@@ -27,20 +28,20 @@ std::string in_one_line(std::string text);
 /// A legible text for elements and for attributes in quotes: the signs of HTML escaped.
 std::string escaped(std::string_view text);
 
-/// What stands for an argument of html().
-inline std::string shielded(const Markup& markup) { return markup.text; }
-inline std::string shielded(std::string_view text) { return escaped(text); }
-inline std::string shielded(std::integral auto number) { return std::to_string(number); }
+/// What stands in a slot of a part: a text or a number, or Markup as it is.
+struct Slot {
+  Slot(std::string_view of, const Markup& markup) : name(of), shielded(markup.text) {}
+  Slot(std::string_view of, std::string_view text) : name(of), shielded(escaped(text)) {}
+  Slot(std::string_view of, const std::string& text) : Slot(of, std::string_view(text)) {}
+  Slot(std::string_view of, const char* text) : Slot(of, std::string_view(text)) {}
+  Slot(std::string_view of, std::integral auto number) : name(of), shielded(std::to_string(number)) {}
 
-/// HTML from a format, whose literal parts are HTML, and texts that are HTML already.
-Markup filled(std::string_view format, const std::vector<std::string>& shielded_texts);
+  std::string_view name;
+  std::string shielded;
+};
 
-/// HTML from a format as fmt::format() takes it, whose literal parts are HTML. Arguments are escaped unless they are
-/// Markup.
-template <typename... Arguments>
-Markup html(std::string_view format, const Arguments&... arguments) {
-  return filled(format, {shielded(arguments)...});
-}
+/// A part of web/src/report.html with its slots filled. Every slot has to be named, and no other.
+Markup part(std::string_view name, const std::vector<Slot>& slots = {});
 
 /// A heading of level 1 to 6.
 Markup heading(int level, std::string_view text);

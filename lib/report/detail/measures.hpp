@@ -1,6 +1,5 @@
 #pragma once
 
-#include "tunica/core/quantity.hpp"
 #include "tunica/report/detail/case_report.hpp"
 
 #include <functional>
@@ -11,12 +10,6 @@
 
 namespace tunica::report {
 
-/// An input that the user states with a unit of his own.
-struct StatedInput {
-  std::string key;  ///< in the report's `stated.typed`; with '-' for '_' the flag of tunica-simulate
-  Dimension dimension;
-};
-
 /// A number of a case: a column of the table.
 struct Measure {
   std::string key;          ///< in the TSV, the unit last
@@ -26,8 +19,8 @@ struct Measure {
   std::string source;       ///< where it comes from: stage and key
   bool compared = false;    ///< shown as a strip, and searched for outliers
   std::function<std::optional<double>(const PipelineCase&)> value;
-  bool is_bound = false;  ///< certainly not passed: rounded up
-  std::optional<StatedInput> input{};
+  bool is_bound = false;   ///< certainly not passed: rounded up
+  std::string input = {};  ///< in the report's `stated.typed`, as the user wrote it; empty: it is none
 
   /// A value for people: whole where it has no unit, else three digits.
   [[nodiscard]] std::string text(double of) const;

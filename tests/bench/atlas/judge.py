@@ -1,12 +1,11 @@
 """Runs of the tools for one cell of a map, and the verdict on them."""
-import json
 import math
 import os
 import signal
-import subprocess
 from dataclasses import dataclass, field
 
 from published import write_ply
+from running import measure
 
 RIGHT, DOUBTFUL, REFUSED, WRONG = "R", "D", "X", "W"
 ORDER = RIGHT + DOUBTFUL + REFUSED + WRONG  # the worst last
@@ -62,23 +61,18 @@ class Runner:
     def tool(self, verb, *arguments):
         """@return the report's result; every other end than exit code 0 is raised"""
         name = f"{verb}-{len(self.reports)}.json"
-        command = ["prlimit", f"--cpu={LONGEST_RUN_S}", os.path.join(os.environ["TUNICA_BIN"], "tunica-" + verb),
-                   *map(str, arguments), "--report", name, "--quiet", "--force", "--threads", "1"]
-        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=False)
-        report = {}
-        if os.path.exists(self.path(name)):
-            with open(self.path(name), encoding="utf-8") as file:
-                report = json.load(file)
-        self.reports.append((verb, [verb, *map(str, arguments)], report))
+        done = measure(verb, *arguments, folder=self.folder, report=name, code=range(-64, 7),
+                       within=["prlimit", f"--cpu={LONGEST_RUN_S}"])
+        self.reports.append((verb, [verb, *map(str, arguments)], done.report or {}))
         if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
             raise Ended(-1, f"did not end within {LONGEST_RUN_S} s")
         if done.returncode != 0:
             raise Ended(done.returncode, done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "no message")
-        self.warnings += report["warnings"]
-        algebra = report["result"].get("algebraic_error_percent")
+        self.warnings += done.report["warnings"]
+        algebra = done.report["result"].get("algebraic_error_percent")
         if algebra is not None and algebra > 100 * ALLOWED_ERROR:
             self.warnings.append(f"algebraic_error_percent is {algebra:.3g}")
-        return report["result"]
+        return done.report["result"]
 
     def simulate(self, scene, mesh=None):
         """A scene file of the body in mesh.ply."""

@@ -1,9 +1,6 @@
 """Meshes of known surfaces: turned at random and with their nodes shifted at random along the surface, by a seed."""
-import math
-
+import meshes
 import numpy as np
-
-from published import organ
 
 SHIFT = 0.12  # of the length of an edge, to either side
 
@@ -28,8 +25,7 @@ def mean_edge(points, triangles):
 
 def sphere(frequency, radius, rng):
     """Geodesic, 20 x frequency^2 triangles."""
-    points, triangles, _ = organ(frequency)
-    directions = points / np.linalg.norm(points, axis=1)[:, None]
+    directions, triangles = meshes.geodesic(frequency)
     shift = SHIFT * mean_edge(directions, triangles)
     directions = directions + rng.uniform(-shift, shift, directions.shape)
     directions = directions @ rotation(rng).T
@@ -39,26 +35,11 @@ def sphere(frequency, radius, rng):
 
 def disc(rings, radius, rng):
     """A flat disc of 6 x rings^2 triangles; its boundary nodes stay on the circle."""
-    points, triangles, start = [(0.0, 0.0)], [], [0]
-    for ring in range(1, rings + 1):
-        start.append(len(points))
-        angle = 2 * math.pi * (np.arange(6 * ring) / (6 * ring))
-        points += list(zip(radius * ring / rings * np.cos(angle), radius * ring / rings * np.sin(angle)))
-    for ring in range(1, rings + 1):
-        inner, outer = start[ring - 1], start[ring]
-        for side in range(6):
-            for k in range(ring):
-                a, b = outer + side * ring + k, outer + (side * ring + k + 1) % (6 * ring)
-                c = inner + (side * (ring - 1) + k) % max(1, 6 * (ring - 1))
-                triangles.append((a, b, c))
-                if k < ring - 1:
-                    triangles.append((b, inner + (side * (ring - 1) + k + 1) % max(1, 6 * (ring - 1)), c))
-    points = np.array(points)
-    inside = slice(0, start[rings])
-    points[inside] += rng.uniform(-SHIFT, SHIFT, points[inside].shape) * radius / rings
-    points = np.column_stack([points, 0 * points[:, 0]])
+    points, triangles = meshes.disc(rings, radius)
+    inside = slice(0, 3 * rings * (rings - 1) + 1)
+    points[inside, :2] += rng.uniform(-SHIFT, SHIFT, points[inside, :2].shape) * radius / rings
     normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    return turned((points, np.array(triangles), normals), rotation(rng))
+    return turned((points, triangles, normals), rotation(rng))
 
 
 def lattice(columns, rows, rng, closed=False):

@@ -6,6 +6,7 @@ import numpy as np
 from atlas import meshes
 from atlas.charted import Axis, Border, Map
 from atlas.judge import DEFAULT, Method
+from meshes import Ply
 from published import write_ply
 
 # ----------------------------------------------------------------------------------------------------------- voxels
@@ -49,22 +50,10 @@ def relaxed(runner, method, *options):
     """coarse.ply fitted to target.ply: the report's result, vertices and triangles of the curved surface."""
     result = runner.tool("relax", "coarse.ply", "target.ply", "shell.ply", "--curved", "curved.ply", "--method",
                          method.run.get("method", "fit"), *options)
-    return result, *read_ply(runner.path("curved.ply"))
+    curved = Ply(runner.path("curved.ply"))
+    return result, curved.vertices, curved.triangles
 
 SAMPLES = 4  # points per edge at which shells are looked at
-
-
-def read_ply(path):
-    """Vertices and triangles of a binary PLY with doubles and 32-bit indices."""
-    with open(path, "rb") as file:
-        lines = []
-        while not lines or lines[-1] != "end_header":
-            lines.append(file.readline().decode().strip())
-        vertices, faces = (int(line.split()[2]) for line in lines if line.startswith("element"))
-        columns = sum(line.startswith("property double") for line in lines)
-        points = np.frombuffer(file.read(8 * columns * vertices), "<f8").reshape(vertices, columns)[:, :3]
-        rows = np.frombuffer(file.read(13 * faces), np.dtype([("n", "u1"), ("i", "<i4", 3)]))
-        return points.copy(), rows["i"].copy()
 
 
 def together(*parts):

@@ -3,6 +3,7 @@
 #include "shell/families.hpp"
 #include "tunica/draw/chart.hpp"
 #include "tunica/draw/picture.hpp"
+#include "tunica/draw/shaded_surface.hpp"
 #include "tunica/draw/slice_sheet.hpp"
 #include "tunica/draw/thumbnail.hpp"
 
@@ -16,6 +17,11 @@ TEST(DrawArguments, MeshesAreChecked) {
   const std::vector<Call<TriangleMesh>> calls{
       {"surface_picture", [](const TriangleMesh& m) { surface_picture(m, {}, {}); }},
       {"thumbnail", [](const TriangleMesh& m) { thumbnail(m, {}, {}); }},
+      {"shaded_surface", [](const TriangleMesh& m) { shaded_surface(m, std::vector<double>(m.vertices.size(), 1.0)); }},
+      {"moved_picture",
+       [](const TriangleMesh& m) {
+         moved_picture(m, std::vector<Vec3>(m.vertices.size(), Vec3::Zero()), {}, {}, 1, {});
+       }},
   };
   expect_checked(sphere(1), calls);
   for (const auto& call : calls) {
@@ -45,6 +51,13 @@ TEST(DrawArguments, ValuesAndNumbersAreChecked) {
   const std::vector<double> few(3, 1.0);
   expect_refused("values", [&] { surface_picture(ball, few, {}); });
   expect_refused("values of a thumbnail", [&] { thumbnail(ball, few, {}); });
+  expect_refused("values to be shaded", [&] { shaded_surface(ball, few); });
+  const std::vector<Vec3> still(ball.vertices.size(), Vec3::Zero());
+  expect_refused("displacements", [&] { moved_picture(ball, {}, {}, {}, 1, {}); });
+  expect_refused("edges", [&] { moved_picture(ball, still, {{0, ball.vertices.size()}}, {}, 1, {}); });
+  for (const double magnify : {0.0, -1.0, nan}) {
+    expect_refused("magnification", [&] { moved_picture(ball, still, {}, {}, magnify, {}); });
+  }
   expect_refused("pixels", [&] {
     ThumbnailOptions options;
     options.longest = 0;

@@ -165,6 +165,12 @@ TEST(Quantity, WhatHasTwoMeaningsIsToldBoth) {
               EndsWith("write 1000mm (the comma groups thousands) or 1.000mm (the comma is decimal)"));
 }
 
+TEST(Quantity, PercentagesAreWrittenWithTwoDigitsAndNeverAsPowers) {
+  for (const auto& [part, text] : {std::pair(0.01234, "1.2 %"), {0.994, "99 %"}, {0.996, "100 %"}, {12.3, "1230 %"}}) {
+    EXPECT_EQ(percent_text(part), text);
+  }
+}
+
 TEST(Quantity, NumbersAndPercentagesWithACommaToo) {
   EXPECT_THAT(right_numbers("0,45"), testing::ElementsAre("0.45"));
   EXPECT_TRUE(right_numbers("half").empty());

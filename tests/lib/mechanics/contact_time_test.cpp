@@ -152,6 +152,38 @@ TEST(ContactInTime, ALoadThatRisesAndFallsWithinAStepDoesWork) {
   EXPECT_EQ(seen(model, motion(4e-3, 1e-4)).parts, 40U);
 }
 
+/// A plate of .4 mg falls .2 mm under gravity onto a plane: never more than m g h swings, and it comes back no higher
+/// than it began.
+TEST(Energy, OfAFallIsNotGainedByAnImpact) {
+  constexpr double height = 0.2, gravity = 9810, energy = 4e-7 * gravity * height;
+  const Grid grid = make_grid(6, 6, [](double u, double v) { return Vec3(20 * u, 20 * v, 0.5 + height); });
+  for (const double young : {1.0, 100.0}) {
+    for (const Integrator integrator : {Integrator::backward_euler, Integrator::generalised_alpha}) {
+      Model model;
+      model.shells.push_back(flat_body(grid.mesh, young, 0.3, 1));
+      model.shells[0].material.density = 1e-9;
+      model.loads.push_back({0, GravityLoad{Vec3(0, 0, -gravity)}, {}});
+      model.rigids.push_back({"floor", RigidPlane{{{{0, Vec3::Zero()}}}, Vec3::UnitZ()}, {}, {}});
+      Contact contact;
+      contact.name = "c";
+      contact.between = {ContactParty{false, 0}, ContactParty{true, 0}};
+      model.contacts.push_back(contact);
+      double swings = 0, rises = 0;
+      const Summary summary = solve(model, motion(0.02, 1e-4, integrator), [&](const State& state) {
+        swings = std::max(swings, state.kinetic_energy + state.strain_energy);
+        for (const Vec3& u : state.displacement) {
+          rises = std::max(rises, u.z());
+        }
+      });
+      EXPECT_LT(swings, 1.1 * energy) << young;
+      EXPECT_LT(rises, 0.05 * height) << young;
+      EXPECT_GT(summary.contact_pressures.at(0), 0);
+      EXPECT_LT(summary.energy->gained, 0.1) << young;
+      EXPECT_LT(summary.energy->work, 1.001 * energy) << "gravity does no more";
+    }
+  }
+}
+
 TEST(Energy, IsNotGainedByWhatIsDamped) {
   for (const Integrator integrator : {Integrator::backward_euler, Integrator::generalised_alpha}) {
     for (const Damping damping : {Damping{0, 0}, Damping{300, 0}, Damping{0, 2e-3}, Damping{100, 1e-3}}) {

@@ -1,6 +1,7 @@
 // What hints that an organ is not held as it is in the body.
 
 #include "tunica/mechanics/runs/hold_doubts.hpp"
+#include "tunica/mechanics/runs/meeting_walls.hpp"
 
 #include "benchmarks.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
@@ -162,6 +163,61 @@ TEST(HoldDoubts, WallsThroughEachOtherAreSaidWithThePlace) {
   EXPECT_THAT(watch.found()->text, HasSubstr("[[contact]]"));
   watch.see(at_rest(model));
   EXPECT_TRUE(watch.found());
+}
+
+/// A tube of radius 10 about one of 8.5, and a state in which the outer one is scaled and shifted along the axis and
+/// all is turned about x.
+struct NestedTubes {
+  Model model = tube(10, 40, 0.5, 0.01);
+  NestedTubes() {
+    const Model inner = tube(8.5, 40, 0.5, 0.01);
+    model.shells.push_back(inner.shells[0]);
+  }
+  [[nodiscard]] State moved(double scale, double shift, double turn = 0) const {
+    State state = at_rest(model);
+    const Mat3 rotation = Eigen::AngleAxisd(turn, Vec3::UnitX()).toRotationMatrix();
+    for (std::size_t i = 0; i < model.node_count(); ++i) {
+      const std::size_t body = model.first_node(1) <= i ? 1 : 0;
+      const Vec3 x = model.shells[body].mesh.vertices[i - model.first_node(body)];
+      const Vec3 y = body == 0 ? Vec3(scale * x.x(), scale * x.y(), x.z() + shift) : x;
+      state.displacement[i] = rotation * y - x;
+      state.rotation[i] = turn * Vec3::UnitX();
+    }
+    return state;
+  }
+};
+
+TEST(HoldDoubts, WallsThatHaveWhollyPassedEachOtherBetweenTwoStatesAreSaid) {
+  const NestedTubes tubes;
+  CrossingWatch watch(tubes.model);
+  watch.see(tubes.moved(1, 0));
+  EXPECT_FALSE(watch.found());
+  watch.see(tubes.moved(0.7, 0));  // the outer one lies 1.5 mm within the inner one
+  ASSERT_TRUE(watch.found());
+  EXPECT_EQ(watch.found()->kind, "walls through each other");
+  EXPECT_THAT(watch.found()->text, HasSubstr("has passed through itself or another at "));
+}
+
+TEST(HoldDoubts, WallsThatOverlapByMoreThanHalfAreSaid) {
+  const NestedTubes tubes;
+  for (const auto& [radius, said] : {std::pair(8.7, true), {8.9, false}}) {  // walls of 0.5 mm about 8.5 and this
+    CrossingWatch watch(tubes.model);
+    watch.see(tubes.moved(radius / 10, 0));
+    ASSERT_EQ(watch.found().has_value(), said) << radius;
+    if (said) {
+      EXPECT_EQ(watch.found()->kind, "walls overlap");
+      EXPECT_THAT(watch.found()->text, HasSubstr("by more than half of it"));
+    }
+  }
+}
+
+TEST(HoldDoubts, WallsThatSlideAndTurnTogetherMeetNothing) {
+  const NestedTubes tubes;
+  CrossingWatch watch(tubes.model);
+  watch.see(tubes.moved(1, 15));
+  watch.see(tubes.moved(1.1, -15, 2.5));
+  watch.see(tubes.moved(1, 0, -0.5));
+  EXPECT_FALSE(watch.found());
 }
 
 TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {

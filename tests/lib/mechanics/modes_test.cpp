@@ -110,6 +110,23 @@ std::vector<double> plate_numbers(const Model& model, double side, double thickn
   return numbers;
 }
 
+/// Pressure that follows the wall turns with it: the six rigid motions have no frequency, and the lowest modes are
+/// five.
+TEST(Modes, OfABallUnderPressureEndAndLeaveOutItsRigidMotions) {
+  Model model = free_sphere(8, 20, 1);
+  const double at_rest = frequencies(model, 1).front();
+  Load load;
+  load.kind = PressureLoad{1, true};  // a thousandth of Young's modulus: strains of .7 %
+  model.loads.push_back(load);
+  const std::vector<double> found = frequencies(model, 6);
+  for (std::size_t k = 1; k < 5; ++k) {
+    EXPECT_NEAR(found[k] / found[0], 1, 2e-3) << k;
+  }
+  EXPECT_GT(found[0], 1.005 * at_rest);
+  EXPECT_LT(found[0], 1.1 * at_rest);
+  EXPECT_GT(found[5], 1.1 * found[4]);
+}
+
 TEST(Lanczos, FindsTheEigenvaluesOfADenseProblem) {
   constexpr Eigen::Index n = 120;
   std::srand(4);

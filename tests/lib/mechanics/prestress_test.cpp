@@ -300,6 +300,18 @@ TEST(Prestress, EnergiesOfAMotionAreThoseSinceTheImage) {
 }
 
 /// A sphere in tension rings higher than one at rest: w^2 of every mode grows.
+/// Suction on a sphere below and above its buckling load, 2 E t^2 / (R^2 sqrt(3 (1 - nu^2))).
+TEST(Prestress, SaysWhetherTheImageIsAStableStateOfRest) {
+  const double critical = 2 * 2 * 0.25 * 0.25 / (100 * std::sqrt(3 * (1 - 0.45 * 0.45)));
+  for (const auto& [suction, stable] : {std::pair(0.5 * critical, true), {1.5 * critical, false}}) {
+    Model model = closed(make_sphere(10, 4), 0.25);
+    model.loads[0].kind = PressureLoad{-suction, true, -suction};
+    EXPECT_EQ(System(model, nonlinear_run({1})).rests_as_imaged(), stable) << suction;
+    model.shells[0].material.young_stated = false;
+    EXPECT_EQ(System(model, nonlinear_run({1})).rests_as_imaged(), std::nullopt);
+  }
+}
+
 TEST(Prestress, RaisesFrequencies) {
   Model model = closed(make_geodesic(20, 6), 0.5);
   model.shells[0].material.density = 1.1e-9;

@@ -37,7 +37,7 @@ std::size_t count(const std::string& text, const std::string& part) {
   return found;
 }
 
-TEST(Ticks, are_round_and_cover_the_range) {
+TEST(Ticks, AreRoundAndCoverTheRange) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> exponent(-12, 12);
   std::uniform_real_distribution<double> part(-1, 1);
@@ -66,7 +66,7 @@ TEST(Ticks, are_round_and_cover_the_range) {
   }
 }
 
-TEST(Ticks, texts_have_the_decimals_of_the_step) {
+TEST(Ticks, TextsHaveTheDecimalsOfTheStep) {
   EXPECT_EQ(tick_text(0.1, 0.05), "0.10");
   EXPECT_EQ(tick_text(0.25, 0.25), "0.25");
   EXPECT_EQ(tick_text(20, 5), "20");
@@ -81,14 +81,14 @@ TEST(Ticks, texts_have_the_decimals_of_the_step) {
   EXPECT_EQ(short_number(0), "0");
 }
 
-TEST(Ticks, range_without_width_or_beyond_double_ends) {
+TEST(Ticks, RangeWithoutWidthOrBeyondDoubleEnds) {
   EXPECT_EQ(round_ticks(3, 3, 7), std::vector<double>{3});
   EXPECT_EQ(round_ticks(3, 2, 7), std::vector<double>{3});
   EXPECT_LE(round_ticks(-largest, largest, 7).size(), 8u);
   EXPECT_LE(round_ticks(0, smallest, 7).size(), 8u);
 }
 
-TEST(Scale, is_logarithmic_beyond_one_decade_without_negative_values) {
+TEST(Scale, IsLogarithmicBeyondOneDecadeWithoutNegativeValues) {
   EXPECT_EQ(resolved_scale(Scale::automatic, {1, 9.9}), Scale::linear);
   EXPECT_EQ(resolved_scale(Scale::automatic, {1, 10.1}), Scale::logarithmic);
   EXPECT_EQ(resolved_scale(Scale::automatic, {-1, 1, 100}), Scale::linear);
@@ -113,7 +113,7 @@ bool dominated(const ChartMark& mark, const Chart& chart) {
   return false;
 }
 
-TEST(ParetoFront, agrees_with_its_definition) {
+TEST(ParetoFront, AgreesWithItsDefinition) {
   std::mt19937 random(3);
   for (int round = 0; round < 200; ++round) {
     Chart chart;
@@ -133,7 +133,7 @@ TEST(ParetoFront, agrees_with_its_definition) {
   }
 }
 
-TEST(ChartSvg, has_a_front_only_where_both_axes_are_ranked) {
+TEST(ChartSvg, HasAFrontOnlyWhereBothAxesAreRanked) {
   Chart chart = chart_of({{1, 2}, {3, 1}});
   EXPECT_EQ(count(chart_svg(chart), "class=\"front\""), 1u);
   EXPECT_EQ(count(chart_svg(chart), "Pareto front"), 1u);
@@ -143,12 +143,12 @@ TEST(ChartSvg, has_a_front_only_where_both_axes_are_ranked) {
   EXPECT_EQ(count(chart_svg(chart), "Pareto front"), 0u);
 }
 
-TEST(ChartSvg, has_a_mark_per_point) {
+TEST(ChartSvg, HasAMarkPerPoint) {
   EXPECT_EQ(count(chart_svg(chart_of({{1, 2}, {3, 4}, {5, 1}})), "class=\"mark\""), 3u);
   EXPECT_EQ(count(chart_svg(chart_of({})), "class=\"mark\""), 0u);
 }
 
-TEST(ChartSvg, survives_every_range_of_numbers) {
+TEST(ChartSvg, SurvivesEveryRangeOfNumbers) {
   const std::vector<std::vector<std::pair<double, double>>> cases{
       {{1, 1}},
       {{0, 0}},
@@ -177,7 +177,7 @@ TEST(ChartSvg, survives_every_range_of_numbers) {
   }
 }
 
-TEST(ChartSvg, ticks_of_a_narrow_range_differ) {
+TEST(ChartSvg, TicksOfANarrowRangeDiffer) {
   for (const double base : {1e15, 1e6, 3e4, 1.0, 1e-2, 1e-7, -4e8}) {
     for (const double width : {1e-1, 1e-4, 1e-7}) {
       const std::string svg = chart_svg(chart_of({{base, 1}, {base * (1 + width), 2}}));
@@ -194,7 +194,7 @@ TEST(ChartSvg, ticks_of_a_narrow_range_differ) {
   }
 }
 
-TEST(ChartSvg, zeros_have_a_lane_on_a_logarithmic_axis) {
+TEST(ChartSvg, ZerosHaveALaneOnALogarithmicAxis) {
   const std::string svg = chart_svg(chart_of({{1, 0}, {2, 0.1}, {3, 100}}));
   EXPECT_EQ(count(svg, "class=\"mark\""), 3u);
   EXPECT_THAT(svg, HasSubstr(">0<"));
@@ -222,7 +222,7 @@ std::vector<std::string> x_ticks(const std::string& svg) {
   return texts;
 }
 
-TEST(ChartSvg, ticks_of_an_axis_are_written_in_one_way) {
+TEST(ChartSvg, TicksOfAnAxisAreWrittenInOneWay) {
   EXPECT_EQ(x_ticks(chart_svg(chart_of({{1, 1}, {100'000, 2}}))),
             (std::vector<std::string>{"1", "10", "100", "1,000", "10,000", "100,000"}));
   EXPECT_EQ(x_ticks(chart_svg(chart_of({{1e3, 1}, {5e7, 2}}))),
@@ -231,7 +231,7 @@ TEST(ChartSvg, ticks_of_an_axis_are_written_in_one_way) {
             (std::vector<std::string>{"0", "10,000", "20,000", "30,000", "40,000"}));
 }
 
-TEST(ChartSvg, long_names_and_labels_are_broken_not_cut) {
+TEST(ChartSvg, LongNamesAndLabelsAreBrokenNotCut) {
   Chart chart = chart_of({{1, 2}, {3, 4}});
   const std::string words =
       "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen";
@@ -241,7 +241,7 @@ TEST(ChartSvg, long_names_and_labels_are_broken_not_cut) {
   EXPECT_EQ(count(svg, "sixteen<"), 5u);  // one is the <title> of the picture
 }
 
-TEST(ChartSvg, has_colours_for_the_dark) {
+TEST(ChartSvg, HasColoursForTheDark) {
   const std::string svg = chart_svg(chart_of({{1, 2}}));
   EXPECT_THAT(svg, HasSubstr("@media (prefers-color-scheme:dark)"));
   // Every colour can change: none stands alone.
@@ -249,7 +249,7 @@ TEST(ChartSvg, has_colours_for_the_dark) {
   EXPECT_EQ(count(svg, " stroke=\"#"), count(svg, "stroke:var("));
 }
 
-TEST(ChartSvg, text_is_escaped_and_utf8) {
+TEST(ChartSvg, TextIsEscapedAndUtf8) {
   Chart chart = chart_of({{1, 2}});
   chart.title = "a<b>&\"c\" \x01\xff\xc3 \xed\xa0\x80 é";
   chart.series.front().name = "</svg><script>";
@@ -261,7 +261,7 @@ TEST(ChartSvg, text_is_escaped_and_utf8) {
   EXPECT_THAT(svg, HasSubstr("é"));
 }
 
-TEST(ChartSvg, legend_ends_where_the_picture_does) {
+TEST(ChartSvg, LegendEndsWhereThePictureDoes) {
   Chart chart;
   for (int i = 0; i < 200; ++i) {
     chart.series.push_back({"series " + std::to_string(i), {{double(i), double(i % 7), "run", ""}}, false});
@@ -273,7 +273,7 @@ TEST(ChartSvg, legend_ends_where_the_picture_does) {
   EXPECT_EQ(count(svg, "class=\"mark\""), 200u);
 }
 
-TEST(ChartSvg, series_differ_in_colour_and_shape) {
+TEST(ChartSvg, SeriesDifferInColourAndShape) {
   Chart chart;
   for (int i = 0; i < 56; ++i) {
     chart.series.push_back({std::to_string(i), {{1, 1, "", ""}}, false});
@@ -290,7 +290,7 @@ TEST(ChartSvg, series_differ_in_colour_and_shape) {
   EXPECT_EQ(looks.size(), 56u);
 }
 
-TEST(DescribeKey, gives_words_and_units) {
+TEST(DescribeKey, GivesWordsAndUnits) {
   EXPECT_EQ(describe_key("result.hausdorff_percent.upper"), "Hausdorff distance, upper bound (% of the diagonal)");
   EXPECT_EQ(describe_key("result.iterations.hausdorff_percent.upper"),
             "Hausdorff distance, upper bound (% of the diagonal)");

@@ -23,8 +23,8 @@ using testing::ElementsAre;
 
 TEST(Html, TextStaysText) {
   EXPECT_EQ(escaped("<a href=\"x\">'&`"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;&#96;");
-  EXPECT_EQ(html("<p>{}</p>", std::string("<b>")).text, "<p>&lt;b&gt;</p>");
-  EXPECT_EQ(html("<p>{}</p>", html("<b>{}</b>", "{0}")).text, "<p><b>{0}</b></p>");
+  EXPECT_EQ(part("item", {{"text", std::string("<b>")}}).text, "<li>&lt;b&gt;</li>\n");
+  EXPECT_EQ(part("item", {{"text", part("name", {{"name", "{text}"}})}}).text, "<li><bdi>{text}</bdi></li>\n");
 }
 
 TEST(Html, WhatIsNoUtf8OrTurnsTheTextIsReplaced) {
@@ -108,7 +108,7 @@ TEST(Measures, InputsAreShownAsTheyWereStated) {
   EXPECT_EQ(pressure(0.016, "1.6e4Pa"), "1.6e4 Pa (16 kPa)");
   EXPECT_EQ(pressure(0.016, "<b>"), "16 kPa") << "no quantity";
   one.reports["simulate"] = {{"command", "tunica-simulate s.ply r.hdf --pressure 120mmHg"}};
-  EXPECT_EQ(shown(one, "pressure_kpa"), "120 mmHg (16.0 kPa)") << "a report of an older tool";
+  EXPECT_EQ(shown(one, "pressure_kpa"), "") << "no command is read";
   EXPECT_EQ(shown(one, "imaged_at_kpa"), "");
   one.reports["simulate"] = {{"stated",
                               {{"pressure_mpa", 0.0159986865},
@@ -201,6 +201,7 @@ DrawnResult sphere() {
   const Tessellation fine = tessellate_uniformly(shell, 4);
   DrawnResult result;
   result.shells = shell.triangles.size();
+  result.pieces = 4;
   // Patches share their points, as in a result file.
   std::map<std::array<long, 3>, Index> at;
   std::vector<Index> shared;
@@ -231,9 +232,9 @@ DrawnResult sphere() {
 
 void expect_the_same_field(const DrawnShells& drawn, double tolerance) {
   ASSERT_EQ(drawn.states.size(), 2U);
-  ASSERT_EQ(drawn.states[1].displacement.size(), drawn.mesh.vertices.size());
-  for (std::size_t v = 0; v < drawn.mesh.vertices.size(); ++v) {
-    const Vec3& p = drawn.mesh.vertices[v];
+  ASSERT_EQ(drawn.states[1].displacement.size(), drawn.reference.vertices.size());
+  for (std::size_t v = 0; v < drawn.reference.vertices.size(); ++v) {
+    const Vec3& p = drawn.reference.vertices[v];
     EXPECT_LT((drawn.states[1].displacement[v] - 0.1 * p).norm(), tolerance);
     EXPECT_NEAR(drawn.states[1].membrane[v], 2 + p.z(), 10 * tolerance);
     EXPECT_NEAR(drawn.states[1].von_mises[v], 1 + p.z(), 10 * tolerance);
@@ -244,28 +245,27 @@ TEST(DrawnShellsTest, AreCutIntoFewerPiecesFirst) {
   const std::size_t shells = sphere().shells;  // 128
   for (const auto& [most, pieces] : {std::pair{100'000, 4U}, {1'000, 2U}, {200, 1U}}) {
     const DrawnShells drawn = thinned(sphere(), narrow<std::size_t>(most));
-    EXPECT_EQ(drawn.mesh.triangles.size(), shells * pieces * pieces);
+    EXPECT_EQ(drawn.reference.triangles.size(), shells * pieces * pieces);
     EXPECT_EQ(drawn.edges.size(), shells * 3 / 2 * pieces) << "every edge once";
     // Euler's number of a closed surface: no point is there twice, none is missing.
-    EXPECT_EQ(drawn.mesh.vertices.size(), drawn.mesh.triangles.size() / 2 + 2);
+    EXPECT_EQ(drawn.reference.vertices.size(), drawn.reference.triangles.size() / 2 + 2);
     expect_the_same_field(drawn, 1e-12);
   }
 }
 
 TEST(DrawnShellsTest, AreDecimatedWhereTheShellsAloneAreTooMany) {
   const DrawnShells drawn = thinned(sphere(), 60);
-  EXPECT_LE(drawn.mesh.triangles.size(), 60U);
+  EXPECT_LE(drawn.reference.triangles.size(), 60U);
   EXPECT_TRUE(drawn.edges.empty());
   expect_the_same_field(drawn, 0.2);
 }
 
-TEST(DrawnShellsTest, OfAnotherKindStayAsTheyAre) {
-  DrawnResult odd = sphere();
-  odd.reference.triangles.pop_back();
-  const std::size_t triangles = odd.reference.triangles.size();
-  const DrawnShells drawn = thinned(std::move(odd), 100'000);
-  EXPECT_EQ(drawn.mesh.triangles.size(), triangles);
-  EXPECT_THAT(drawn.labels, ElementsAre("As imaged", "Loaded"));
+TEST(DrawnShellsTest, StatesAreCalledByTheirLoads) {
+  DrawnResult result = sphere();
+  EXPECT_THAT(labels_of(result), ElementsAre("As imaged", "Loaded"));
+  result.is_unloaded = true;
+  result.states[1].load_factor = 0.5;
+  EXPECT_THAT(labels_of(result), ElementsAre("Without load", "Load × 0.5"));
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 """What holds for every tool when a disk is full, a folder cannot be written to, or an input vanishes while it is read: one
 line that names the file, exit code 5 or 3, and nothing under a final name that is not whole."""
-import json
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -10,7 +10,8 @@ import tempfile
 import time
 import unittest
 
-BIN = pathlib.Path(os.environ["TUNICA_BIN"])
+from running import ToolTest, run_tool
+
 LOAD = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "1mm", "--pressure", "1kPa", "--fix", "rigid-motions",
         "--static", "--load-steps", "2"]
 
@@ -42,7 +43,7 @@ def make_inputs(folder):
              ["decimate", "surface.ply", "coarse.ply", "--triangles", "120"],
              ["relax", "coarse.ply", "surface.ply", "shell.ply", "--tolerance", "2%", "--refine"])
     for verb, *words in chain:
-        subprocess.run([BIN / f"tunica-{verb}", *words, "--quiet", "--report", case / f"{verb}.json"], cwd=folder, check=True)
+        run_tool(verb, *words, "--quiet", folder=folder, report=case / f"{verb}.json")
         if words[1].endswith(".ply"):
             shutil.copy(pathlib.Path(folder, words[1 if verb != "relax" else 2]), case)
     shutil.copy(case / "relax.json", folder)
@@ -63,7 +64,7 @@ COMMANDS = {
 }
 
 
-class Disk(unittest.TestCase):
+class Disk(ToolTest):
     @classmethod
     def setUpClass(cls):
         cls.made = tempfile.mkdtemp(prefix="tunica-disk-")
@@ -71,23 +72,21 @@ class Disk(unittest.TestCase):
         make_inputs(cls.made)
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-disk-"))
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        super().setUp()
         shutil.copytree(self.made, self.folder, dirs_exist_ok=True)
         for name in ("disk", "left"):
             (self.folder / name).mkdir()
 
-    def command(self, verb, report="report.json"):
-        return [BIN / f"tunica-{verb}", *COMMANDS[verb][0], "--quiet", "--threads", "1", "--force",
-                *(["--report", report] if report else [])]
+    WORDS = ["--quiet", "--threads", "1", "--force"]
 
-    def run_words(self, *words):
-        return subprocess.run(words, cwd=self.folder, capture_output=True, text=True, check=False)
+    def run_command(self, verb, *more, disk=None, **options):
+        """@param disk  a script that mounts one and runs what follows, and the script's own words"""
+        self.run_tool(verb, *COMMANDS[verb][0], *self.WORDS, *more, **options,
+                      within=["unshare", "-rm", "sh", "-c", disk[0], "sh", *disk[1:]] if disk else [])
 
     def whole(self, verb):
         """The outputs of an undisturbed run, which are then removed."""
-        done = self.run_words(*self.command(verb))
-        self.assertEqual(done.returncode, 0, (verb, done.stderr))
+        self.run_command(verb)
         outputs = {path.name: path.read_bytes() for path in (self.folder / "disk").iterdir()}
         self.assertGreater(len(outputs), 0, verb)
         self.empty("disk")
@@ -96,13 +95,6 @@ class Disk(unittest.TestCase):
     def empty(self, name):
         shutil.rmtree(self.folder / name)
         (self.folder / name).mkdir()
-
-    def check_refusal(self, verb, done, code, words):
-        """One line, the code and the report."""
-        self.assertEqual(done.returncode, code, (verb, done.stderr))
-        self.assertRegex(done.stderr, rf"^tunica-{verb}: [^\n]*{words}[^\n]*\n$", verb)
-        report = json.loads((self.folder / "report.json").read_text())
-        self.assertEqual((report["ok"], f"tunica-{verb}: {report['error']}\n"), (False, done.stderr))
 
     def check_left(self, verb, where, whole):
         """Nothing under a final name but what is whole."""
@@ -118,13 +110,12 @@ class Disk(unittest.TestCase):
             needed = sum(map(len, whole.values()))
             for part in (0, 0.4, 0.9):
                 pages = max(1, int(part * needed / 4096))
-                done = self.run_words("unshare", "-rm", "sh", "-c", ON_A_SMALL_DISK, "sh", str(4096 * pages),
-                                      *self.command(verb))
                 with self.subTest(verb=verb, pages=pages):
-                    if done.returncode == 0:  # a chart may fit in one
+                    self.run_command(verb, code=(0, 5), disk=[ON_A_SMALL_DISK, str(4096 * pages)])
+                    if self.done.returncode == 0:  # a chart may fit in one
                         self.assertLess(needed, 3 * 4096)
                     else:
-                        self.check_refusal(verb, done, 5, "disk/.*No space left on device")
+                        self.assertRegex(self.done.stderr, "disk/.*No space left on device")
                     self.check_left(verb, "left", whole)
                 self.empty("left")
 
@@ -134,28 +125,25 @@ class Disk(unittest.TestCase):
             whole = self.whole(verb)
             largest = max(map(len, whole.values()))
             for part in (0.01, 0.9):
-                limit = f"--fsize={int(part * largest)}"
+                limit = int(part * largest)
                 with self.subTest(verb=verb, limit=limit):
-                    done = self.run_words("prlimit", limit, *self.command(verb, report=None))
-                    self.assertEqual(done.returncode, 5, (verb, done.stderr))
-                    self.assertRegex(done.stderr, rf"(?m)^tunica-{verb}: disk/[^\n]*File too large[^\n]*$", verb)
+                    self.run_command(verb, code=5, report=False, limits={resource.RLIMIT_FSIZE: limit})
+                    self.assertRegex(self.done.stderr, rf"^tunica-{verb}: disk/.*File too large")
                     self.check_left(verb, "disk", whole)
                 self.empty("disk")
 
     @unittest.skipUnless(namespaces(), "no disk can be mounted in a namespace of its own")
     def test_a_read_only_folder(self):
         for verb in COMMANDS:
-            done = self.run_words("unshare", "-rm", "sh", "-c", ON_A_READ_ONLY_DISK, "sh", *self.command(verb))
-            self.check_refusal(verb, done, 5, "disk/.*Read-only file system")
+            self.run_command(verb, code=5, disk=[ON_A_READ_ONLY_DISK])
+            self.assertRegex(self.done.stderr, "disk/.*Read-only file system")
 
     @unittest.skipUnless(namespaces(), "no disk can be mounted in a namespace of its own")
     def test_a_report_that_cannot_be_written(self):
         """Said before any work."""
         for verb in COMMANDS:
-            done = self.run_words("unshare", "-rm", "sh", "-c", ON_A_READ_ONLY_DISK, "sh",
-                                  *self.command(verb, report="disk/report.json"))
-            self.assertEqual(done.returncode, 5, (verb, done.stderr))
-            self.assertRegex(done.stderr, rf"^tunica-{verb}: disk/report.json[^\n]*Read-only file system[^\n]*\n$")
+            self.run_command(verb, "--report", "disk/report.json", code=5, report=False, disk=[ON_A_READ_ONLY_DISK])
+            self.assertRegex(self.done.stderr, rf"^tunica-{verb}: disk/report.json.*Read-only file system")
 
     def open_files(self, process):
         try:
@@ -163,9 +151,9 @@ class Disk(unittest.TestCase):
         except OSError:
             return []
 
-    def stopped_while_reading(self, command, path):
-        """Starts the command and stops it as soon as it has the file open. @return the process, and whether it had it open"""
-        process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    def stopped_while_reading(self, verb, path):
+        """Starts the tool and stops it as soon as it has the file open. @return the process, and whether it had it open"""
+        process = self.start_tool(verb, *COMMANDS[verb][0], *self.WORDS)
         limit = time.monotonic() + 20
         while process.poll() is None and time.monotonic() < limit:
             if str(path) in self.open_files(process):
@@ -183,7 +171,7 @@ class Disk(unittest.TestCase):
             path = (self.folder / name).resolve()
             data = path.read_bytes()
             for _ in range(4):
-                process, reading = self.stopped_while_reading(self.command(verb, report=None), path)
+                process, reading = self.stopped_while_reading(verb, path)
                 hits += reading
                 os.truncate(path, len(data) // 2)
                 process.send_signal(signal.SIGCONT)

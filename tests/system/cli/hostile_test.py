@@ -5,35 +5,19 @@ files with blanks, quotation marks, line ends, signs of any script and bytes tha
 """
 import json
 import os
-import pathlib
 import re
 import resource
 import shutil
 import struct
-import subprocess
-import tempfile
 import unittest
 import xml.etree.ElementTree
 
 import meshes
 import numpy as np
+from running import ToolTest, run_tool
 
-BIN = pathlib.Path(os.environ["TUNICA_BIN"])
 MANY = 100_000
 LOAD = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "1mm", "--pressure", "1kPa", "--static"]
-
-
-def write_soup(path, vertices, triangles, normals=None):
-    """A PLY of so many that a loop in Python would take longer than the tools."""
-    names = ("x", "y", "z", "nx", "ny", "nz")[:6 if normals is not None else 3]
-    rows = vertices if normals is None else np.hstack([vertices, normals])
-    faces = np.empty(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, triangles
-    with open(path, "wb") as file:
-        file.write(("ply\nformat binary_little_endian 1.0\ncomment units mm\n" + f"element vertex {len(rows)}\n" +
-                    "".join(f"property double {name}\n" for name in names) + f"element face {len(triangles)}\n" +
-                    "property list uchar int vertex_indices\nend_header\n").encode())
-        file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes() + faces.tobytes())
 
 
 def apart(count, size):
@@ -49,48 +33,35 @@ def tangled(count):
     return random.uniform(0, 100, (count // 2, 3)), random.integers(0, count // 2, (count, 3))
 
 
-class Hostile(unittest.TestCase):
+class Hostile(ToolTest):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-hostile-"))
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        meshes.write_ply(self.folder / "ball.ply", *meshes.sphere(3, 40.0, (50.0, 50.0, 50.0)), comments=["units mm"])
+        super().setUp()
+        meshes.write_ply_mm(self.folder / "ball.ply", *meshes.sphere(3, 40.0, (50.0, 50.0, 50.0)))
 
-    def run_tool(self, verb, *words, seconds=60):
+    def run_tool(self, *words, seconds=60, code=(0, 3, 4, 6), **options):
         """@return the exit code and what was said, which is an answer or one line. Time is that of the processor, so that
         a busy machine does not matter"""
-        def limit():
-            resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-
-        done = subprocess.run([BIN / f"tunica-{verb}", *words, "--threads", "1", "--quiet", "--force", "--report",
-                               "report.json"], cwd=self.folder, capture_output=True, text=True, errors="surrogateescape",
-                              preexec_fn=limit, check=False)
-        self.assertIn(done.returncode, (0, 3, 4, 6), (verb, words, done.stderr))
-        report = json.loads((self.folder / "report.json").read_text())
-        self.assertEqual(report["ok"], done.returncode == 0)
-        if done.returncode != 0:
-            self.assertRegex(done.stderr, rf"^tunica-{verb}: [^\n]+\n$")
-        return done.returncode, done.stderr
+        super().run_tool(*words, "--threads", 1, "--quiet", "--force", limits={resource.RLIMIT_CPU: seconds}, code=code, **options)
+        return self.done.returncode, self.done.stderr
 
 
 class Soups(Hostile):
     """Many triangles that are no surface: bounded time and memory, and an answer or a refusal that says why."""
 
     def expect(self, verb, *words, code, says="", memory="400MB"):
-        found, said = self.run_tool(verb, *words, "--memory-limit", memory, seconds=30)
-        self.assertIn(found, code if isinstance(code, tuple) else (code,), said)
-        self.assertIn(says, said)
+        self.run_tool(verb, *words, "--memory-limit", memory, seconds=30, code=code, says=says)
 
     def test_triangles_between_any_vertices(self):
-        write_soup(self.folder / "soup.ply", *tangled(MANY))
+        meshes.write_ply_mm(self.folder / "soup.ply", *tangled(MANY))
         self.expect("decimate", "soup.ply", "out.ply", "--triangles", "800", code=3, says="soup.ply: ")
         self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=3, says="soup.ply: ")
         self.expect("simulate", "soup.ply", "out.hdf", *LOAD, "--fix", "rigid-motions", code=3, says="soup.ply: ")
 
     def test_triangles_apart(self):
-        write_soup(self.folder / "fewer.ply", *apart(MANY // 4, 1.0))
+        meshes.write_ply_mm(self.folder / "fewer.ply", *apart(MANY // 4, 1.0))
         self.expect("decimate", "fewer.ply", "out.ply", "--triangles", "800", code=4)
-        write_soup(self.folder / "soup.ply", *apart(MANY, 1.0))
+        meshes.write_ply_mm(self.folder / "soup.ply", *apart(MANY, 1.0))
         # A surface of so many pieces is one; a limit on memory may end it.
         self.expect("relax", "soup.ply", "ball.ply", "out.ply", code=(3, 6), memory="100MB")
         self.expect("relax", "ball.ply", "soup.ply", "out.ply", code=(3, 6), memory="100MB")
@@ -120,7 +91,7 @@ class FewTriangles(Hostile):
                     words = [name if word == "MESH" else word for word in words]
                     yield verb, words, *self.run_tool(verb, *words, *more)
 
-    def test_none(self):
+    def test_none_is_refused_by_name(self):
         files = {
             "none.ply": b"ply\nformat ascii 1.0\ncomment units mm\nelement vertex 3\nproperty double x\nproperty double y\n"
                         b"property double z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n"
@@ -138,17 +109,16 @@ class FewTriangles(Hostile):
                 self.assertIn(f"{name}: ", said)
                 self.assertFalse(list(self.folder.glob("out.*")))
 
-    def test_one(self):
+    def test_a_single_one_is_answered_without_nan(self):
         up = [(0.0, 0.0, 1.0)] * 3
         meshes.write_ply(self.folder / "one.ply", [(0, 0, 0), (80, 0, 0), (0, 80, 0)], [(0, 1, 2)], up, ["units mm"])
         for verb, words, code, said in self.run_all("one.ply"):
             if verb == "decimate" or (verb, words[:2]) == ("compare", ["one.ply", "one.ply"]):
                 self.assertEqual(code, 0, (verb, words, said))
             if code == 0:
-                numbers = json.loads((self.folder / "report.json").read_text())["result"]
-                self.assertNotIn("NaN", json.dumps(numbers))
+                self.assertNotIn("NaN", json.dumps(self.done.report["result"]))
                 if verb in ("decimate", "relax"):
-                    self.assertGreaterEqual(len(meshes.read_ply(self.folder / "out.ply")[2]), 1)
+                    self.assertGreaterEqual(len(meshes.Ply(self.folder / "out.ply").triangles), 1)
 
 
 class Names(Hostile):
@@ -170,8 +140,8 @@ class Names(Hostile):
         def path(ending):
             return f"./folder {name}/{name}{ending}"
 
-        def run(verb, *words):
-            self.assertEqual(self.run_tool(verb, *words), (0, ""), (verb, words))
+        def run(*words, **options):
+            self.run_tool(*words, code=0, **options)
 
         run("phantom", "sphere", path(".nii.gz"), "--size", "16", "--spacing", "3")
         run("extract", path(".nii.gz"), path("-surface.ply"), "--label", "1")
@@ -183,8 +153,7 @@ class Names(Hostile):
         case = folder / "out" / name / "1"
         case.mkdir(parents=True)
         run("relax", path("-coarse.ply"), path("-surface.ply"), path(".ply"), "--max-iterations", "1", "--picture",
-            path(".png"), "--map", path("-map.ply"))
-        shutil.copy(self.folder / "report.json", case / "relax.json")
+            path(".png"), "--map", path("-map.ply"), report=case / "relax.json")
         shutil.copy(folder / f"{name}.ply", case / "shell.ply")
         self.assertEqual(os.fsencode(json.loads((case / "relax.json").read_text())["inputs"][0]["path"]).decode(errors="replace"),
                          os.fsencode(path("-coarse.ply")).decode(errors="replace"))
@@ -196,10 +165,8 @@ class Names(Hostile):
         run("simulate", path(".ply"), path(".hdf"), *LOAD, "--fix", "rigid-motions", "--picture", path("-c.png"), *exports)
         for kind in ("pvd", "xmf"):
             if not in_xml:
-                done = subprocess.run([BIN / "tunica-simulate", path(".ply"), path("-x.hdf"), *LOAD, "--fix", "rigid-motions",
-                                       "--export", kind], cwd=self.folder, capture_output=True, check=False)
-                self.assertEqual(done.returncode, 2, done.stderr)
-                self.assertIn(b"which has signs that no XML can hold", done.stderr)
+                self.run_tool("simulate", path(".ply"), path("-x.hdf"), *LOAD, "--fix", "rigid-motions", "--export", kind, code=2,
+                              says="which has signs that no XML can hold")
                 continue
             for node in xml.etree.ElementTree.parse(folder / f"{name}.{kind}").iter():
                 if node.get("file"):
@@ -223,9 +190,7 @@ class Names(Hostile):
         for name in ("-rf.ply", "--help.ply", "--triangles"):
             shutil.copy(self.folder / "ball.ply", self.folder / name)
             self.assertEqual(self.run_tool("compare", "ball.ply", f"./{name}")[0], 0)
-            done = subprocess.run([BIN / "tunica-decimate", "--triangles", "100", "--", name, f"{name}-out.ply"],
-                                  cwd=self.folder, capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 0, done.stderr)
+            run_tool("decimate", "--triangles", 100, "--", name, f"{name}-out.ply", folder=self.folder)
             self.assertTrue((self.folder / f"{name}-out.ply").is_file())
 
 

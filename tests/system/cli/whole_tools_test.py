@@ -11,13 +11,10 @@ import subprocess
 import tempfile
 import unittest
 
-BIN = os.environ["TUNICA_BIN"]
+from running import command, run_tool, start_tool
+
 LOAD = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "1mm", "--pressure", "1kPa", "--fix", "rigid-motions",
         "--static", "--load-steps", "2"]
-
-
-def tool(verb):
-    return os.path.join(BIN, "tunica-" + verb)
 
 
 class WholeTools(unittest.TestCase):
@@ -26,12 +23,11 @@ class WholeTools(unittest.TestCase):
         cls.folder = tempfile.mkdtemp(prefix="tunica-tools-")
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         # One step of the chain each: what is read stays, what is written is new for every test.
-        for command in (["phantom", "sphere", "ball.nii.gz", "--size", "16"],
-                        ["extract", "ball.nii.gz", "surface.ply", "--label", "1", "--smooth", "staircase"],
-                        ["decimate", "surface.ply", "coarse.ply", "--triangles", "100"],
-                        ["relax", "coarse.ply", "surface.ply", "shell.ply", "--report", "relax.json",
-                         "--tolerance", "2%", "--refine"]):
-            subprocess.run([tool(command[0]), *command[1:]], cwd=cls.folder, check=True, capture_output=True)
+        for words in (["phantom", "sphere", "ball.nii.gz", "--size", "16"],
+                      ["extract", "ball.nii.gz", "surface.ply", "--label", "1", "--smooth", "staircase"],
+                      ["decimate", "surface.ply", "coarse.ply", "--triangles", "100"]):
+            run_tool(*words, folder=cls.folder)
+        run_tool("relax", "coarse.ply", "surface.ply", "shell.ply", "--tolerance", "2%", "--refine", folder=cls.folder, report="relax.json")
 
     COMMANDS = {
         "phantom": (["sphere", "out.nii", "--size", "16"], "out.nii"),
@@ -61,10 +57,14 @@ class WholeTools(unittest.TestCase):
         with open(self.path("report.json"), encoding="utf-8") as file:
             return json.load(file)
 
+    def run_tool(self, *words, report=False, **options):
+        """run_tool() in the folder of all tests"""
+        return run_tool(*words, folder=self.folder, report=report, **options)
+
     def run_shell(self, redirection, verb, *arguments):
         """The exit code with standard streams as a shell puts them."""
-        program = ["bash", "-c", f'"$@" {redirection}', "bash", tool(verb), *arguments]
-        return subprocess.run(program, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        words = ["bash", "-c", f'"$@" {redirection}', "bash", *command(verb, *arguments)]
+        return subprocess.run(words, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                               check=False).returncode
 
     def test_lost_words_cost_nothing(self):
@@ -100,8 +100,8 @@ class WholeTools(unittest.TestCase):
                     # A reader that is gone for certain before anything is written.
                     reader, writer = os.pipe()
                     os.close(reader)
-                    code = subprocess.run([tool(verb), *words], cwd=self.folder, stdout=writer,
-                                          stderr=subprocess.DEVNULL, check=False).returncode
+                    code = subprocess.run(command(verb, *words), cwd=self.folder, stdout=writer, stderr=subprocess.DEVNULL,
+                                          check=False).returncode
                     os.close(writer)
                 else:
                     code = self.run_shell(redirection, verb, *words)
@@ -110,9 +110,8 @@ class WholeTools(unittest.TestCase):
     def test_help_has_the_tools_own_options_first(self):
         for verb in self.COMMANDS:
             with self.subTest(verb):
-                text = subprocess.run([tool(verb), "-h"], capture_output=True, text=True, check=True).stdout
-                long = subprocess.run([tool(verb), "--help"], capture_output=True, text=True, check=True).stdout
-                self.assertEqual(text, long)
+                text = self.run_tool(verb, "-h").stdout
+                self.assertEqual(text, self.run_tool(verb, "--help").stdout)
                 headings = re.findall(r"(?m)^([A-Z][^\n]*):$", text)
                 self.assertEqual(headings[-2:], ["Options of every tool", "Example"])
                 self.assertEqual(len(headings), len(set(headings)))
@@ -127,70 +126,52 @@ class WholeTools(unittest.TestCase):
 
     def test_version_says_which_instructions_run(self):
         for verb in self.COMMANDS:
-            text = subprocess.run([tool(verb), "--version"], capture_output=True, text=True, check=True).stdout
-            self.assertRegex(text, rf"^tunica-{verb} \d+\.\d+\.\d+ \((x86-64|x86-64-v3|other)\)\n$")
+            self.assertRegex(self.run_tool(verb, "--version").stdout, rf"^tunica-{verb} \d+\.\d+\.\d+ \((x86-64|x86-64-v3|other)\)\n$")
 
     def test_a_bare_call_shows_the_short_usage(self):
         for verb in self.COMMANDS:
-            run = subprocess.run([tool(verb)], capture_output=True, text=True)
-            self.assertEqual((run.returncode, run.stdout), (2, ""), verb)
+            run = self.run_tool(verb, code=2)
+            self.assertEqual(run.stdout, "", verb)
             self.assertRegex(run.stderr, rf"^tunica-{verb}: usage: tunica-{verb} \[OPTIONS\] \S+.*\n$")
 
     def test_a_mistyped_flag_gets_the_nearest_one(self):
         for verb, flag, meant in (("relax", "--tolerence=1%", "--tolerance"), ("simulate", "--presure", "--pressure"),
                                   ("decimate", "--triangle", "--triangles"), ("extract", "--fill-cavites", "--fill-cavities")):
-            run = subprocess.run([tool(verb), *self.COMMANDS[verb][0], flag], cwd=self.folder, capture_output=True, text=True)
-            self.assertEqual(run.returncode, 2)
-            self.assertIn(f"did you mean {meant}?", run.stderr)
-        run = subprocess.run([tool("relax"), "--nonsense"], capture_output=True, text=True)
-        self.assertNotIn("did you mean", run.stderr)
+            self.run_tool(verb, *self.COMMANDS[verb][0], flag, code=2, says=f"did you mean {meant}?")
+        self.assertNotIn("did you mean", self.run_tool("relax", "--nonsense", code=2).stderr)
 
     def test_report_on_standard_output(self):
         for verb, (arguments, output) in self.COMMANDS.items():
             with self.subTest(verb):
-                run = subprocess.run([tool(verb), *arguments, "--report", "-"], cwd=self.folder, capture_output=True)
-                self.assertEqual(run.returncode, 0, run.stderr)
-                report = json.loads(run.stdout)
+                report = json.loads(self.run_tool(verb, *arguments, "--report", "-").stdout)
                 self.assertEqual((report["ok"], report["tool"]), (True, "tunica-" + verb))
                 self.assertTrue(report["inputs"] or verb == "phantom")
                 self.assertFalse(os.path.exists(self.path("-")))
                 self.setUp()
-        run = subprocess.run([tool("relax"), "none.ply", "surface.ply", "out.ply", "--report", "-"], cwd=self.folder,
-                             capture_output=True)
-        self.assertEqual((run.returncode, json.loads(run.stdout)["ok"]), (3, False))
-        run = subprocess.run([tool("relax"), "--report", "-", "--nonsense"], cwd=self.folder, capture_output=True)
-        self.assertEqual((run.returncode, json.loads(run.stdout)["ok"]), (2, False))
-        with open("/dev/full", "wb") as full:
-            run = subprocess.run([tool("decimate"), *self.COMMANDS["decimate"][0], "--report", "-"], cwd=self.folder,
-                                 stdout=full, stderr=subprocess.PIPE)
-        self.assertEqual(run.returncode, 5, run.stderr)
+        for code, words, says in ((3, ["relax", "none.ply", "surface.ply", "out.ply"], "none.ply"), (2, ["relax", "--nonsense"], "--nonsense"),
+                                  (2, ["extract", "ball.nii.gz", "--info"], "leaves standard output to the report")):
+            run = self.run_tool(*words, "--report", "-", code=code, says=says)
+            self.assertFalse(json.loads(run.stdout)["ok"])
+        self.assertEqual(self.run_shell(">/dev/full", "decimate", *self.COMMANDS["decimate"][0], "--report", "-"), 5)
         self.assertTrue(os.path.exists(self.path("out.ply")))
-        run = subprocess.run([tool("extract"), "ball.nii.gz", "--info", "--report", "-"], cwd=self.folder,
-                             capture_output=True)
-        self.assertEqual(run.returncode, 2)
-        self.assertIn(b"leaves standard output to the report", run.stderr)
-        self.assertFalse(json.loads(run.stdout)["ok"])
 
     def test_a_second_run_on_one_output_is_refused(self):
         for verb, (arguments, output) in self.COMMANDS.items():
             with self.subTest(verb), open(self.path(output + ".part"), "wb") as part:
                 # What a run that writes this output does before it works.
                 fcntl.lockf(part, fcntl.LOCK_EX)
-                second = subprocess.run([tool(verb), *arguments, "--force"], cwd=self.folder, capture_output=True,
-                                        text=True, check=False)
-                self.assertEqual(second.returncode, 5, second.stderr)
-                self.assertIn("another run is writing it", second.stderr)
+                self.run_tool(verb, *arguments, "--force", code=5, says="another run is writing it")
                 self.assertTrue(os.path.exists(self.path(output + ".part")))
                 self.assertFalse(os.path.exists(self.path(output)))
 
     def test_many_runs_on_one_output(self):
         arguments, output = self.COMMANDS["decimate"]
-        command = [tool("decimate"), *arguments, "--force", "--quiet"]
-        subprocess.run(command, cwd=self.folder, check=True)
+        words = ["decimate", *arguments, "--force", "--quiet"]
+        self.run_tool(*words)
         whole = self.bytes_of(output)
         for _ in range(5):
-            runs = [subprocess.Popen(command, cwd=self.folder, stderr=subprocess.DEVNULL) for _ in range(8)]
-            codes = [run.wait() for run in runs]
+            runs = [start_tool(*words, folder=self.folder) for _ in range(8)]
+            codes = [run.communicate() and run.returncode for run in runs]
             self.assertLessEqual(set(codes), {0, 5})
             self.assertIn(0, codes)
             self.assertEqual(self.bytes_of(output), whole)
@@ -212,10 +193,7 @@ class WholeTools(unittest.TestCase):
             part = self.path(output + ".part")
             for make in (os.mkfifo, lambda path: os.symlink(self.path("out.elsewhere"), path)):
                 make(part)
-                done = subprocess.run([tool(verb), *arguments, "--force"], cwd=self.folder, capture_output=True, text=True,
-                                      timeout=60, check=False)
-                self.assertEqual(done.returncode, 5, (verb, done.stderr))
-                self.assertIn(output + ".part: is a", done.stderr)
+                self.run_tool(verb, *arguments, "--force", code=5, says=output + ".part: is a")
                 self.assertFalse(os.path.exists(self.path("out.elsewhere")))
                 os.remove(part)
 
@@ -250,33 +228,26 @@ class WholeTools(unittest.TestCase):
             "h.mha": (f"ObjectType = Image\nNDims = 3\nDimSize = {side}\nElementType = MET_UCHAR\n"
                       "ElementDataFile = LOCAL\n").encode() + bytes(99)}
 
-        def limit():
-            resource.setrlimit(resource.RLIMIT_AS, (600 << 20, 600 << 20))
-            resource.setrlimit(resource.RLIMIT_CPU, (5, 5))
-
         for name, data in files.items():
             with open(self.path(name), "wb") as file:
                 file.write(data)
-            command = ([tool("extract"), name, "out.ply", "--label", "1"] if name[2:] in ("nii", "nrrd", "mha") else
-                       [tool("decimate"), name, "out.ply", "--triangles", "4", "--mesh-unit", "mm"])
-            run = subprocess.run(command + ["--threads", "1"], cwd=self.folder, capture_output=True, text=True,
-                                 preexec_fn=limit)
-            self.assertEqual(run.returncode, 3, (name, run.stderr))
-            self.assertIn(name, run.stderr)
+            words = (["extract", name, "out.ply", "--label", "1"] if name[2:] in ("nii", "nrrd", "mha") else
+                     ["decimate", name, "out.ply", "--triangles", "4", "--mesh-unit", "mm"])
+            self.run_tool(*words, "--threads", "1", code=3, says=name, limits={resource.RLIMIT_AS: 600 << 20, resource.RLIMIT_CPU: 5})
+
+    def within(self, most, verb, *words):
+        """Runs a tool, which may not even start, within so many bytes of addresses."""
+        return subprocess.run(command(verb, *words), cwd=self.folder, capture_output=True, text=True, check=False,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)))
 
     def test_memory_that_ends_has_a_code_of_its_own(self):
         """Address space from what the program needs to start to what it needs: done or exit code 6, nothing else."""
         for verb, (arguments, output) in self.COMMANDS.items():
             ended = 0
             for mebibytes in range(60, 1500, 20):
-                def limit(bytes_=mebibytes << 20):
-                    resource.setrlimit(resource.RLIMIT_AS, (bytes_, bytes_))
-
-                start = subprocess.run([tool(verb), "--version"], preexec_fn=limit, capture_output=True, check=False)
-                if start.returncode != 0:
+                if self.within(mebibytes << 20, verb, "--version").returncode != 0:
                     continue  # the system could not load it
-                done = subprocess.run([tool(verb), *arguments, "--force", "--threads", "2", "--report", "report.json"],
-                                      cwd=self.folder, capture_output=True, text=True, preexec_fn=limit, check=False)
+                done = self.within(mebibytes << 20, verb, *arguments, "--force", "--threads", "2", "--report", "report.json")
                 if done.returncode == 0:
                     break
                 ended += 1
@@ -293,16 +264,10 @@ class WholeTools(unittest.TestCase):
     def test_memory_that_does_not_do_to_start_is_said_as_well(self):
         """The first mebibytes above what the system needs to load the program: done or exit code 6, nothing else."""
         for verb, (arguments, _) in self.COMMANDS.items():
-            def run(kibibytes, words):
-                def limit():
-                    resource.setrlimit(resource.RLIMIT_AS, (kibibytes << 10, kibibytes << 10))
-                return subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True,
-                                      preexec_fn=limit, check=False)
-
-            loaded = next(k for k in range(4 << 10, 1 << 20, 1 << 9) if run(k, ["--version"]).returncode == 0)
+            loaded = next(k for k in range(4 << 10, 1 << 20, 1 << 9) if self.within(k << 10, verb, "--version").returncode == 0)
             # A mebibyte more, for libraries make objects before main(), and not the same amount each time.
             for kibibytes in range(loaded + (1 << 10), loaded + (5 << 10), 1 << 8):
-                done = run(kibibytes, [*arguments, "--force"])
+                done = self.within(kibibytes << 10, verb, *arguments, "--force")
                 self.assertIn(done.returncode, (0, 6), (verb, kibibytes, done.stderr))
                 self.assertNotIn("terminate", done.stderr)
 
@@ -313,51 +278,41 @@ class WholeTools(unittest.TestCase):
             shutil.copy(self.path(name), self.path("cases/ball/1"))
         return {**self.COMMANDS, "report": (["cases", "-o", "out.html"], "out.html")}
 
-    def limited(self, kind, most, verb, *words):
-        return subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True, check=False,
-                              preexec_fn=lambda: resource.setrlimit(kind, (most, most)))
-
     def test_a_report_that_no_descriptor_is_left_for(self):
         """ulimit -n 4: told before the work."""
         for verb, (arguments, output) in self.every_command().items():
-            done = self.limited(resource.RLIMIT_NOFILE, 4, verb, *arguments, "--report", "report.json")
-            self.assertEqual((done.returncode, done.stderr), (5, f"tunica-{verb}: report.json: cannot be written: Too many open "
-                                                                 "files: allow more (ulimit -n)\n"), verb)
+            done = self.run_tool(verb, *arguments, "--report", "report.json", code=5, limits={resource.RLIMIT_NOFILE: 4})
+            self.assertEqual(done.stderr, f"tunica-{verb}: report.json: cannot be written: Too many open files: allow more "
+                                          "(ulimit -n)\n")
             self.assertFalse([name for name in os.listdir(self.folder) if name.startswith(("report.json", output))])
 
     def test_a_limit_of_open_files_is_named(self):
         """ulimit -n 4: an input that cannot be opened for that is not called a bad one."""
         for verb in ("extract", "decimate"):
             arguments, output = self.COMMANDS[verb]
-            done = self.limited(resource.RLIMIT_NOFILE, 4, verb, *arguments, "--force")
-            self.assertEqual(done.returncode, 6, (verb, done.stderr))
-            self.assertIn("cannot be read: Too many open files: allow more (ulimit -n)", done.stderr, verb)
+            self.run_tool(verb, *arguments, "--force", code=6, limits={resource.RLIMIT_NOFILE: 4},
+                          says="cannot be read: Too many open files: allow more (ulimit -n)")
 
     def test_a_small_stack_does(self):
         for verb, (arguments, output) in self.every_command().items():
-            done = self.limited(resource.RLIMIT_STACK, 64 << 10, verb, *arguments, "--force", "--report", "report.json")
-            self.assertEqual(done.returncode, 0, (verb, done.stderr))
+            small = {resource.RLIMIT_STACK: 64 << 10}
+            self.run_tool(verb, *arguments, "--force", report=True, limits=small)
             self.assertTrue(os.path.getsize(self.path(output)))
-            for words, code in ((["--help"], 0), (["--nonsense"], 2)):
-                self.assertEqual(self.limited(resource.RLIMIT_STACK, 64 << 10, verb, *words).returncode, code, verb)
+            self.run_tool(verb, "--help", limits=small)
+            self.run_tool(verb, "--nonsense", code=2, limits=small)
 
     def test_two_hyphens_end_the_options(self):
         files = {"phantom": 2, "extract": 2, "decimate": 2, "relax": 3, "compare": 2, "simulate": 2, "chart": 1, "report": 1}
         for verb, (arguments, output) in self.every_command().items():
             count = files[verb]
-            words = [*arguments[count:], "--force", "--report", "report.json", "--", *arguments[:count]]
-            done = subprocess.run([tool(verb), *words], cwd=self.folder, capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 0, (verb, done.stderr))
+            self.run_tool(verb, *arguments[count:], "--force", "--", *arguments[:count], report=True)
             self.assertTrue(os.path.getsize(self.path(output)))
-            done = subprocess.run([tool(verb), "--", *arguments[:count], "--report", "r.json"], cwd=self.folder,
-                                  capture_output=True, text=True, check=False)
+            done = self.run_tool(verb, "--", *arguments[:count], "--report", "r.json", code=range(7))
             if done.returncode == 2:  # else the words were taken as files
                 self.assertRegex(done.stderr, "after (that|--) every word is a file|is required", verb)
             # What stands behind them is a name, also where it is that of an option.
             for name in ("--report", "--no-paths", "--help", "--version"):
-                done = subprocess.run([tool(verb), "--", name, "a", "b", "c"], cwd=self.folder, capture_output=True, text=True,
-                                      check=False)
-                self.assertIn(done.returncode, (2, 3), (verb, name, done.stderr))
+                done = self.run_tool(verb, "--", name, "a", "b", "c", code=(2, 3))
                 self.assertEqual((done.stdout, os.path.exists(self.path("a"))), ("", False), (verb, name))
 
 

@@ -5,53 +5,48 @@ and so do the tutorial's commands."""
 import json
 import os
 import re
-import resource
 import subprocess
 import tempfile
 import unittest
 from pathlib import Path
 
-TOOLS = Path(os.environ["TUNICA_BIN"])
+from running import BIN, run_tool
+
 CHAIN = ["phantom", "extract", "decimate", "relax", "compare", "simulate", "chart", "report"]
-LONGEST_SECONDS = 20  # of one processor, whatever else the machine does
 
 
 def examples_of(verb):
     """The command lines under "Example:"."""
-    text = subprocess.run([TOOLS / f"tunica-{verb}", "--help"], capture_output=True, text=True, check=True).stdout
+    text = run_tool(verb, "--help", report=False).stdout
     lines = text.split("\nExample:\n")[1].splitlines()
     return [line.strip() for line in lines if line.strip()]
 
 
 class Examples(unittest.TestCase):
-    def make_case(self, folder, environment):
+    def make_case(self, folder):
         """A case as the pipeline leaves it, for tunica-report."""
         case = folder / "out" / "sample" / "1"
         case.mkdir(parents=True)
         volume = sorted(folder.glob("*.nii.gz"))[0]
-        subprocess.run(["tunica-extract", volume, case / "surface.ply", "--label", "1", "--report", case / "extract.json"], check=True,
-                       env=environment, capture_output=True)
+        run_tool("extract", volume, case / "surface.ply", "--label", 1, report=case / "extract.json")
 
     def test_all_in_the_order_of_the_chain(self):
-        self.assertEqual(sorted(path.name for path in TOOLS.glob("tunica-*")), sorted(f"tunica-{verb}" for verb in CHAIN))
-        environment = {**os.environ, "PATH": f"{TOOLS}:{os.environ['PATH']}"}
+        self.assertEqual(sorted(path.name for path in BIN.glob("tunica-*")), sorted(f"tunica-{verb}" for verb in CHAIN))
+        environment = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"}
         with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
             for verb in CHAIN:
                 if verb == "report":
-                    self.make_case(Path(folder), environment)
+                    self.make_case(Path(folder))
                 examples = examples_of(verb)
                 self.assertGreater(len(examples), 0, verb)
                 for example in examples:
                     with self.subTest(example=example):
                         self.assertTrue(example.startswith(f"tunica-{verb} "))
-                        before = resource.getrusage(resource.RUSAGE_CHILDREN)
                         run = subprocess.run(["sh", "-c", example], cwd=folder, env=environment, capture_output=True,
                                              text=True)
-                        after = resource.getrusage(resource.RUSAGE_CHILDREN)
                         self.assertEqual(run.returncode, 0, run.stderr)
-                        self.assertLess(after.ru_utime - before.ru_utime, LONGEST_SECONDS)
 
-    def test_tutorial(self):
+    def test_the_tutorials_commands_run_as_printed(self):
         source = Path(os.environ["TUNICA_SOURCE"])
         text = (source / "docs" / "tutorial.md").read_text(encoding="utf-8")
         commands = re.findall(r"^```sh\n(.*?)^```", text, flags=re.M | re.S)
@@ -59,7 +54,7 @@ class Examples(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
             os.symlink(source / "data-samples", os.path.join(folder, "data-samples"))
             os.makedirs(os.path.join(folder, "build", "release"))
-            os.symlink(TOOLS, os.path.join(folder, "build", "release", "bin"))
+            os.symlink(BIN, os.path.join(folder, "build", "release", "bin"))
             run = subprocess.run(["sh", "-ec", "".join(commands)], cwd=folder, capture_output=True, text=True)
             self.assertEqual(run.returncode, 0, run.stderr)
             # The numbers it names.

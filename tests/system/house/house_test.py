@@ -221,13 +221,21 @@ class EveryRuleCanFail(unittest.TestCase):
         self.good(rule, "lib/core/a.hpp", "/// all of them\nnamespace a {\n\nint f();\nint g();\n\n}\n")
         self.good(rule, "lib/core/a.hpp", "struct A {\n  int f();\n};\n")
 
-    def test_lengths(self):
-        rule = rules.lengths
-        self.bad(rule, "lib/core/a.cpp", "int f() {\n" + "  g();\n" * 79 + "}\n")
-        self.bad(rule, "tools/a.cpp", "class A {\n  int f() {\n" + "  g();\n" * 79 + "}\n};\n")
-        self.bad(rule, "lib/core/a.hpp", "struct A : B {\n" + "  int a;\n" * 400 + "};\n")
-        self.good(rule, "lib/core/a.cpp", "namespace a {\nint f() {\n" + "  g();\n" * 78 + "}\n" + "int a;\n" * 400 + "}\n")
-        self.good(rule, "lib/core/a.hpp", "struct A {\n" + "  int a;\n" * 398 + "};\n")
+    def test_members(self):
+        rule = rules.members
+        many = "".join(f"  std::map<int, std::function<void(int)>> m{i}_{{0}};\n" for i in range(8)) + "  int a_ = f(1), b_ = 0;\n"
+        few = "class A : public B {\npublic:\n  int f() const { int x_ = 0; return g_(x_); }\n" + many
+        self.good(rule, "lib/core/a.hpp", few + "  static constexpr int s_ = 0;\n  struct Inner { int i_; int k_; };\n};\n")
+        self.bad(rule, "tools/a.cpp", few + "  double c_[3], d_, e_, f_, g_, h_;\n};\n")
+        self.good(rule, "tests/a.cpp", few + "  double c_[3], d_, e_, f_, g_, h_;\n};\n")
+        self.good(rule, "lib/core/a.hpp", "struct A {\n" + "".join(f"  int a{i};\n" for i in range(40)) + "};\n")
+
+    def test_every_exception_is_one(self):
+        """A class that no longer keeps many members has no need of its reason."""
+        allowed, rules.MANY_MEMBERS = rules.MANY_MEMBERS, {}
+        self.addCleanup(setattr, rules, "MANY_MEMBERS", allowed)
+        found = [line for path, text in text_files() for line in rules.members(path, text)]
+        self.assertEqual({re.search(r": (\w+) has", line).group(1) for line in found}, set(allowed))
 
     def test_blanks(self):
         for text in ("\tint a;\n", "int a; \n", "int a;", "int a;\n\n", "int a;\r\n"):

@@ -4,14 +4,13 @@ import json
 import math
 import os
 import re
-import shutil
-import tempfile
 import unittest
 
 import numpy as np
 
 from contact_scenes import block, tube, write_vtk
 from published import LINEAR, Bench, fix, grid, load, organ, probe, run_lines, shell, vessel, write_ply
+from running import ToolTest
 
 PAPER = {"membrane": "cst", "bending": "comas", "rest": "flat"}
 FLAT = {"rest": "flat"}
@@ -22,11 +21,10 @@ def largest(u):
     return np.linalg.norm(u, axis=-1).max()
 
 
-class Limit(unittest.TestCase):
+class Limit(ToolTest):
     def setUp(self):
-        folder = tempfile.mkdtemp(prefix="tunica-limits-")
-        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
-        self.bench = Bench(folder)
+        super().setUp()
+        self.bench = Bench(self.folder)
 
     def vessel(self, thickness, pressure, around=25, along=20, more="", check=True, elements=None, **run):
         """The vessel of 1 MPa with both ends held."""

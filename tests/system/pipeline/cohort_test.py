@@ -6,7 +6,8 @@ import sys
 import unittest
 
 import cohort
-from pipeline_test import LOAD, STAGES, TOOLS, Pipeline, WithStubs
+from pipeline_test import LOAD, STAGES, Pipeline, WithStubs
+from running import built
 
 WALL = "pressure\tyoung\tpoisson\tthickness"
 
@@ -247,7 +248,7 @@ class Alike(WithStubs):
         self.assertEqual(sorted(self.summary()), ["p1/aorta", "p2/aorta", "third/aorta"])
 
 
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom"]), "the tools are not built")
+@unittest.skipUnless(built(*STAGES, "phantom"), "the tools are not built")
 class WholeCohort(Pipeline):
     """The real tools on phantoms, with broken cases among them."""
 
@@ -262,7 +263,7 @@ class WholeCohort(Pipeline):
         """When each file of the results was written, but for reports and logs, by the case's name."""
         state = {}
         for path in self.out.glob("*/*/*"):
-            if path.suffix in (".ply", ".hdf", ".png"):
+            if path.suffix in (".ply", ".hdf", ".page", ".png"):
                 state.setdefault(path.parts[-3], {})[path.name] = path.stat().st_mtime_ns
         return state
 
@@ -272,13 +273,14 @@ class WholeCohort(Pipeline):
         return sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
 
     def test_runs_to_its_end_and_redoes_only_what_changed(self):
-        good = cohort.make_cohort(self.folder, TOOLS, 4, (16, 18))
+        good = cohort.make_cohort(self.folder, 4, (16, 18))
         self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [])
         self.assertEqual(self.done.returncode, 2)
         before = self.state()
         self.assertEqual(sorted(before), sorted([*good, "held-wrongly", "too-close"]))
         for name in good:
-            self.assertEqual(sorted(before[name]), ["coarse.ply", "map.png", "picture.png", "result.hdf", "shell.ply", "surface.ply"])
+            self.assertEqual(sorted(before[name]), ["coarse.ply", "map.png", "picture.png", "result.hdf", "result.page", "shell.ply",
+                                                      "surface.ply"])
         self.assertEqual(sorted(before["too-close"]), ["coarse.ply", "surface.ply"])
         self.assertEqual(cohort.wrong_rows(self.run_cohort(), good), [], "the broken ones are tried again, and named again")
         self.assertEqual(self.redone(before), [])
@@ -287,12 +289,13 @@ class WholeCohort(Pipeline):
         lines = table.read_text().splitlines()
         changed = [line.replace("1.5mm", "2mm") if line.startswith(good[0]) else line for line in lines]
         table.write_text("\n".join(line.replace("\t1\t1.5mm", "\t1kPa\t1.5mm") for line in changed) + "\n")
-        cohort.phantom(TOOLS, self.folder / "scans" / "missing.nii.gz", "sphere", 16, 0, 1)
+        cohort.phantom(self.folder / "scans" / "missing.nii.gz", "sphere", 16)
         done = {row["case"].split("/")[0] for row in self.run_cohort() if row["message"] == "done"}
         self.assertEqual(sorted(done), sorted([*good, "missing", "no-unit"]))
         self.assertEqual(self.redone(before), sorted([good[0], "missing", "no-unit"]))
-        self.assertEqual({name: time for name, time in self.state()[good[0]].items() if name not in ("result.hdf", "picture.png")},
-                         {name: time for name, time in before[good[0]].items() if name not in ("result.hdf", "picture.png")})
+        anew = ("result.hdf", "result.page", "picture.png")
+        self.assertEqual({name: time for name, time in self.state()[good[0]].items() if name not in anew},
+                         {name: time for name, time in before[good[0]].items() if name not in anew})
 
 
 if __name__ == "__main__":

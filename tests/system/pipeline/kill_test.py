@@ -2,7 +2,7 @@
 """Makefile.pipeline killed with SIGKILL at random moments, and an input that vanishes between two stages: whatever stands
 under a final name is whole, and `make` again ends with the results of an undisturbed run.
 
-    TUNICA_BIN=build/release/bin tests/system/pipeline/kill_test.py [--kills 200] [--seed 1]
+    TUNICA_BIN=build/release/bin PYTHONPATH=tests/support tests/system/pipeline/kill_test.py [--kills 200] [--seed 1]
 """
 
 import argparse
@@ -19,7 +19,8 @@ import sys
 import time
 import unittest
 
-from pipeline_test import LOAD, STAGES, TOOLS, Pipeline
+from pipeline_test import LOAD, STAGES, Pipeline
+from running import built
 
 KILLS = 5
 SEED = 1
@@ -78,8 +79,7 @@ def everything(out):
     return {str(path.relative_to(out)) for path in out.rglob("*")}
 
 
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom", "report"]),
-                     "the tools are not built")
+@unittest.skipUnless(built(*STAGES, "phantom", "report"), "the tools are not built")
 class Kills(Pipeline):
     """Two settings take turns, so that files of an earlier run stand in the way."""
 
@@ -87,8 +87,7 @@ class Kills(Pipeline):
 
     def setUp(self):
         super().setUp()
-        subprocess.run([TOOLS / "tunica-phantom", "sphere", self.folder / "sphere.nii.gz", "--size", "16", "--spacing", "3",
-                        "--quiet"], check=True)
+        self.run_tool("phantom", "sphere", "sphere.nii.gz", "--size", 16, "--spacing", 3)
         self.whole, self.names = [], []  # per setting its files' contents, and all that is in OUT
         self.usual = 0.0                 # seconds that a run takes
 
@@ -166,9 +165,8 @@ class Kills(Pipeline):
         for name, data in found.items():
             self.assertTrue(data == self.whole[which][name], f"{moment}: {name}:\n{data[:5000]}")
         self.assertEqual(everything(self.out), self.names[which], moment)
-        verified = subprocess.run([TOOLS / "tunica-report", self.out, "-o", self.folder / "verified.html", "--verify",
-                                   "--force", "--quiet"], capture_output=True, text=True, check=False)
-        self.assertEqual(verified.returncode, 0, f"{moment}: {verified.stderr}")
+        with self.subTest(moment):
+            self.run_tool("report", self.out, "-o", "verified.html", "--verify", "--force", "--quiet")
 
     def test_results_are_those_of_an_undisturbed_run(self):
         self.learn()

@@ -14,24 +14,22 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-SOURCE = pathlib.Path(__file__).resolve().parents[3]
-TOOLS = pathlib.Path(os.environ.get("TUNICA_BIN", SOURCE / "build" / "release" / "bin"))
+from running import BIN, SOURCE, ToolTest, built, program, run_tool
+
 LOAD = {"IMAGED_AT": "0kPa", "PRESSURE": "1kPa", "YOUNG": "1MPa", "POISSON": "0.45", "THICKNESS": "1.5mm"}
 STAGES = ["extract", "decimate", "relax", "simulate"]
 
 
-class Pipeline(unittest.TestCase):
-    """A folder of its own with the results of `make`."""
+class Pipeline(ToolTest):
+    """A folder with the results of `make`."""
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-pipeline-"))
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         self.out = self.folder / "out"
-        self.bin = TOOLS
+        self.bin = BIN
 
     def start(self, *flags, environment=None, **variables):
         words = [f"{name}={value}" for name, value in {"BIN": self.bin, "OUT": self.out, **variables}.items()]
@@ -53,7 +51,7 @@ class Pipeline(unittest.TestCase):
             return {row["case"]: row for row in csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE)}
 
 
-@unittest.skipUnless((TOOLS / "tunica-report").exists(), "tunica-report is not built")
+@unittest.skipUnless(built("report"), "tunica-report is not built")
 class WithStubs(Pipeline):
     """Tools that do nothing, and two volumes."""
 
@@ -61,7 +59,7 @@ class WithStubs(Pipeline):
         super().setUp()
         self.bin = self.folder / "bin"
         self.bin.mkdir()
-        (self.bin / "tunica-report").symlink_to(TOOLS / "tunica-report")
+        (self.bin / "tunica-report").symlink_to(program("report"))
         for verb in STAGES:
             shutil.copy(SOURCE / "tests" / "system" / "pipeline" / "stub_tool", self.bin / f"tunica-{verb}")
         for name in ("a.nii.gz", "b.seg.nrrd"):
@@ -92,7 +90,7 @@ class Rules(WithStubs):
         done = self.make(VOLUMES="a.nii.gz", LABEL=3, **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
         present = {path.name for path in (self.out / "a" / "3").iterdir() if not path.name.startswith(".")}
-        self.assertLessEqual({"surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png", "extract.json",
+        self.assertLessEqual({"surface.ply", "coarse.ply", "shell.ply", "map.png", "result.hdf", "result.page", "picture.png", "extract.json",
                               "decimate.json", "relax.json", "simulate.json"}, present)
         row = self.summary()["a/3"]
         self.assertEqual((row["stage"], row["exit"], row["message"]), ("simulate", "0", "done"))
@@ -175,7 +173,7 @@ class Rules(WithStubs):
         for flag in ("--pressure", "--young"):
             self.assertNotIn(flag, simulate)
 
-    def test_defaults(self):
+    def test_without_choices_an_accuracy_is_asked_for(self):
         self.make(VOLUMES="a.nii.gz", ISOVALUE=-0.5, **LOAD)
         extract, decimate, relax, simulate = self.calls()
         self.assertIn("--isovalue=-0.5 --smooth staircase --largest --fill-cavities", extract)
@@ -193,7 +191,7 @@ class Rules(WithStubs):
             self.assertNotIn("--accuracy", " ".join(self.calls()))
         self.assertTrue((self.out / "a" / "iso-0.5" / "result.hdf").exists())
 
-    def test_dynamic(self):
+    def test_a_dynamic_run_has_its_own_flags(self):
         done = self.make(VOLUMES="a.nii.gz", LABEL=1, KIND="dynamic", DENSITY="1100kg/m3", DURATION="1s", STEP="10ms",
                          **LOAD)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -256,7 +254,7 @@ class Rules(WithStubs):
         self.make(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
         done = self.make(VOLUMES="a.nii.gz", LABEL=1, SHELLS=7, environment={"STUB_FAIL": "decimate/a/1"}, **LOAD)
         self.assertNotEqual(done.returncode, 0)
-        for name in ("coarse.ply", "shell.ply", "map.png", "result.hdf", "picture.png"):
+        for name in ("coarse.ply", "shell.ply", "map.png", "result.hdf", "result.page", "picture.png"):
             self.assertFalse((self.out / "a" / "1" / name).exists(), name)
         self.assertEqual(self.summary()["a/1"]["stage"], "decimate")
 
@@ -553,7 +551,8 @@ class Inputs(WithStubs):
     def test_damaged_files_are_made_anew(self):
         arguments = dict(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
         self.again(arguments)
-        for name, redone in (("surface.ply", STAGES), ("coarse.ply", STAGES[1:]), ("map.png", STAGES[2:]), ("result.hdf", STAGES[3:])):
+        for name, redone in (("surface.ply", STAGES), ("coarse.ply", STAGES[1:]), ("map.png", STAGES[2:]), ("result.hdf", STAGES[3:]),
+                             ("result.page", STAGES[3:])):
             path = self.out / "a" / "1" / name
             good, state = path.read_text(), path.stat()
             path.write_text("damaged")
@@ -566,7 +565,8 @@ class Inputs(WithStubs):
         stub = self.bin / "tunica-extract"  # whose surfaces differ from case to case
         stub.write_text(stub.read_text().replace('echo "$verb" > "$output"', 'echo "$output" > "$output"'))
         self.again(arguments)
-        for stage, files in (("decimate", ["coarse.ply"]), ("relax", ["shell.ply", "map.png"]), ("simulate", ["result.hdf", "picture.png"])):
+        for stage, files in (("decimate", ["coarse.ply"]), ("relax", ["shell.ply", "map.png"]),
+                             ("simulate", ["result.hdf", "result.page", "picture.png"])):
             for name in (*files, f"{stage}.json", f".{stage}.flags"):
                 shutil.copy2(self.out / "a" / "1" / name, self.out / "a" / "2" / name)
         self.assertEqual(self.again(arguments), sorted(STAGES[1:]))
@@ -629,7 +629,7 @@ class Names(WithStubs):
         self.assertNotIn("Traceback", done.stderr)
         return done
 
-    def test_every_sign(self):
+    def test_names_of_every_sign_are_done(self):
         signs = "".join(chr(code) for code in range(0x20, 0x7f) if chr(code) != "/")
         names = [signs, signs[::-1], "`touch pwned`", "$(touch pwned)", "$(shell touch pwned)", "x'\"; touch pwned; '",
                  "a b  c", "--help", "-rf", "${HOME}", "#", "=", "%", "a:b", "~", ".b", "(1)", "a\u00a0b",
@@ -850,7 +850,7 @@ class Runs(WithStubs):
         self.assertEqual(done.stdout.count("  done\n"), 4)
 
     @unittest.skipIf(os.geteuid() == 0, "the superuser may write anywhere")
-    def test_nothing_writable(self):
+    def test_a_folder_that_cannot_be_written_to_is_named(self):
         self.out.mkdir(mode=0o500)
         done = self.make(**self.ARGUMENTS)
         self.assertNotEqual(done.returncode, 0)
@@ -867,15 +867,13 @@ class Runs(WithStubs):
         self.assertEqual([row["message"] for row in self.summary().values()], ["done"] * 4)
 
 
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom", "report"]),
-                     "the tools are not built")
+@unittest.skipUnless(built(*STAGES, "phantom", "report"), "the tools are not built")
 class WholeChain(Pipeline):
     """The real tools on tiny phantoms."""
 
     def phantom(self, shape, size=24):
         path = self.folder / f"{shape}.nii.gz"
-        subprocess.run([TOOLS / "tunica-phantom", shape, path, "--size", str(size), "--spacing", "2"], check=True,
-                       capture_output=True)
+        run_tool("phantom", shape, path, "--size", size, "--spacing", 2)
         return path
 
     def test_phantoms_to_results(self):
@@ -959,9 +957,7 @@ class WholeChain(Pipeline):
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         results = [self.out / name / "1" / "result.hdf" for name in names]
         times = [path.stat().st_mtime_ns for path in results]
-        verified = subprocess.run([TOOLS / "tunica-report", self.out, "-o", self.folder / "page.html", "--verify", "--quiet"],
-                                  capture_output=True, text=True, errors="surrogateescape", check=False)
-        self.assertEqual((verified.returncode, verified.stderr), (0, ""))
+        run_tool("report", self.out, "-o", self.folder / "page.html", "--verify", "--quiet")
         self.assertEqual(self.make("-k", "-j2", **arguments).returncode, 0)
         self.assertEqual([path.stat().st_mtime_ns for path in results], times, "nothing is out of date")
 

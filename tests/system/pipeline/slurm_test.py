@@ -14,7 +14,8 @@ import time
 import unittest
 
 import cohort
-from pipeline_test import STAGES, TOOLS, Pipeline
+from pipeline_test import STAGES, Pipeline
+from running import built
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "srun", "sinfo", "scancel", "squeue")
 RUN = "srun -n1 -c$(THREADS) --mem=$(MEM)M --quiet"
@@ -115,7 +116,7 @@ class Cluster:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom"]), "the tools are not built")
+@unittest.skipUnless(built(*STAGES, "phantom"), "the tools are not built")
 class OnSlurm(Pipeline):
     @classmethod
     def setUpClass(cls):
@@ -134,7 +135,7 @@ class OnSlurm(Pipeline):
 
     def test_a_cohort_with_a_job_killed_in_the_middle(self):
         for number in range(3):
-            cohort.phantom(TOOLS, self.folder / f"{number}.nii.gz", "sphere", 16 + number, 0, 1)
+            cohort.phantom(self.folder / f"{number}.nii.gz", "sphere", 16 + number)
         table = ("case\tvolume\tlabel\tkind\tduration\tstep\np0\t0.nii.gz\t1\n"
                  "p1\t1.nii.gz\t1\tdynamic\t20ms\t2ms\np2\t2.nii.gz\t1\nbroken\tmissing.nii.gz\t1\n")
         # A long motion gives time to kill it.
@@ -162,7 +163,7 @@ class OnSlurm(Pipeline):
 
         before = self.results()
         (self.folder / "cases.tsv").write_text(table)
-        cohort.phantom(TOOLS, self.folder / "missing.nii.gz", "sphere", 16, 0, 2)
+        cohort.phantom(self.folder / "missing.nii.gz", "sphere", 16, seed=2)
         done = self.make("-j2", "-k", **arguments)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertEqual({row["message"] for row in self.summary().values()}, {"done"})

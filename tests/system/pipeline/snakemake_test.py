@@ -2,34 +2,32 @@
 """examples/Snakefile: what it plans for a table of cases, and one case done. Skipped where Snakemake is not installed."""
 
 import os
-import pathlib
 import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import cohort
-from pipeline_test import SOURCE, STAGES, TOOLS
+from pipeline_test import STAGES
+from running import BIN, SOURCE, ToolTest, built
 
 WALL = ("poisson=0.45",)
 
 
 @unittest.skipUnless(shutil.which("snakemake"), "Snakemake is not installed")
-@unittest.skipUnless(all((TOOLS / f"tunica-{verb}").exists() for verb in STAGES + ["phantom"]), "the tools are not built")
-class Snakefile(unittest.TestCase):
+@unittest.skipUnless(built(*STAGES, "phantom"), "the tools are not built")
+class Snakefile(ToolTest):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-snakemake-"))
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         for name in ("my organ", "other"):
-            cohort.phantom(TOOLS, self.folder / f"{name}.nii.gz", "sphere", 16, 0, 1)
+            cohort.phantom(self.folder / f"{name}.nii.gz", "sphere", 16)
         (self.folder / "my organ.tsv").write_text("index\tname\n1\tthe organ\n")
         (self.folder / "cases.tsv").write_text("case\tvolume\tlabel\timaged_at\tthickness\n"
                                                "p1\tmy organ.nii.gz\tthe organ\t0.2kPa\t1.5mm\np2\tother.nii.gz\t1\t1kPa\t1mm\n")
 
     def snakemake(self, *words):
         environment = dict(os.environ, HOME=str(self.folder), XDG_CACHE_HOME=str(self.folder))
-        return subprocess.run(["snakemake", "-s", SOURCE / "examples" / "Snakefile", "-j1", *words, "--config", f"bin={TOOLS}",
+        return subprocess.run(["snakemake", "-s", SOURCE / "examples" / "Snakefile", "-j1", *words, "--config", f"bin={BIN}",
                                *WALL], cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
 
     def test_plans_every_stage_of_every_case(self):

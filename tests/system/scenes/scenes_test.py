@@ -3,7 +3,6 @@
 another vessel."""
 
 import json
-import os
 import re
 import struct
 import subprocess
@@ -13,16 +12,22 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+from running import SHARED, SOURCE, ToolTest, run_tool
 
-SCENES = Path(os.environ["TUNICA_SOURCE"]) / "examples" / "scenes"
-BIN = Path(os.environ["TUNICA_BIN"])
-SIMULATE = BIN / "tunica-simulate"
-SHARED = Path(os.environ.get("TUNICA_SHARED_DATA", "absent"))
+SCENES = SOURCE / "examples" / "scenes"
+
+
+def run_script(folder, name, *words, code=0):
+    """@return what a script of the scenes said"""
+    done = subprocess.run(["/usr/bin/python3", "-B", SCENES / name, *map(str, words)], cwd=folder, capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == code, done.stderr
+    return done.stderr
 
 
 def with_meshes(name, folder, *fineness):
     """Puts the scene and its meshes into the folder."""
-    subprocess.run(["/usr/bin/python3", "-B", SCENES / name / "mesh.py", folder, *fineness], check=True)
+    run_script(folder, f"{name}/mesh.py", folder, *fineness)
     for scene in (SCENES / name).glob("*.toml"):
         (Path(folder) / scene.name).write_text(scene.read_text(encoding="utf-8"), encoding="utf-8")
 
@@ -36,18 +41,13 @@ class Scenes(unittest.TestCase):
                 with_meshes(name, folder)
                 for scene in sorted(Path(folder).glob("*.toml")):
                     with self.subTest(scene=f"{name}/{scene.name}"):
-                        run = subprocess.run([SIMULATE, "--scene", scene, "--check"], capture_output=True, text=True, check=False)
-                        self.assertEqual(run.returncode, 0, run.stderr)
+                        run_tool("simulate", "--scene", scene, "--check", report=False)
 
     @classmethod
     def setUpClass(cls):
         with tempfile.TemporaryDirectory(prefix="tunica-test-") as folder:
             with_meshes("membrane", folder, "8")
-            run = subprocess.run([SIMULATE, "--scene", "scene.toml", "out.hdf", "--report", "report.json", "--quiet"], cwd=folder,
-                                 capture_output=True, text=True, check=False)
-            if run.returncode != 0:
-                raise AssertionError(run.stderr)
-            cls.membrane = json.loads((Path(folder) / "report.json").read_text(encoding="utf-8"))["result"]
+            cls.membrane = run_tool("simulate", "--scene", "scene.toml", "out.hdf", "--quiet", folder=folder).report["result"]
         cls.contact = cls.membrane["contacts"]["tool-membrane"]
 
     def test_the_membrane_pushes_back(self):
@@ -83,15 +83,10 @@ class Pictures(unittest.TestCase):
         with_meshes("membrane", folder.name, "4")
         with_meshes("angioplasty", folder.name)
 
-    def run_in_folder(self, *command, code=0):
-        done = subprocess.run([str(word) for word in command], cwd=self.folder, capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, code, done.stderr)
-        return done.stderr
-
     def drawn(self, text, *words):
         """Runs a scene and draws it. @return pixels, height x width x 3"""
         (self.folder / "any.toml").write_text(text, encoding="utf-8")
-        self.run_in_folder(SIMULATE, "--scene", "any.toml", "any.hdf", "--quiet", "--force")
+        run_tool("simulate", "--scene", "any.toml", "any.hdf", "--quiet", "--force", folder=self.folder)
         self.draw("any.hdf", *words)
         data = (self.folder / "any.png").read_bytes()
         width, height = struct.unpack(">II", data[16:24])
@@ -100,7 +95,7 @@ class Pictures(unittest.TestCase):
         return np.frombuffer(rows, np.uint8).reshape(height, 1 + 3 * width)[:, 1:].reshape(height, width, 3)
 
     def draw(self, result, *words, code=0):
-        return self.run_in_folder("/usr/bin/python3", "-B", SCENES / "draw.py", result, "any.png", *words, code=code)
+        return run_script(self.folder, "draw.py", result, "any.png", *words, code=code)
 
     def test_of_every_kind(self):
         steps = '[run]\nkind = "static"\nload_steps = 2\n'
@@ -124,41 +119,31 @@ class Pictures(unittest.TestCase):
                 self.assertGreater(np.mean(np.any(pixels < 250, axis=2)), 0.05)
 
     def test_what_cannot_be_drawn_is_said(self):
-        self.run_in_folder(SIMULATE, "membrane.ply", "one.hdf", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1mm", "--pressure",
-                           "1kPa", "--fix", "boundary", "--static", "--quiet")
+        run_tool("simulate", "membrane.ply", "one.hdf", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1mm", "--pressure",
+                 "1kPa", "--fix", "boundary", "--static", folder=self.folder)
         self.assertIn("leaves nothing", self.draw("one.hdf", "--cut", "y=-100", code=1))
         self.assertIn("write it like", self.draw("one.hdf", "--cut", "w", code=2))
         self.assertIn("looks along", self.draw("one.hdf", "--view", "0", "0", "1", code=2))
         self.assertIn("absent.hdf", self.draw("absent.hdf", code=1))
 
 
-class OwnVessel(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory(prefix="tunica-test-")
-        self.addCleanup(self.folder.cleanup)
-
-    def run_in_folder(self, *command, code=0):
-        done = subprocess.run([str(word) for word in command], cwd=self.folder.name, capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, code, done.stderr)
-        return done
-
+class OwnVessel(ToolTest):
     def own(self, *words, code=0):
-        return self.run_in_folder("/usr/bin/python3", "-B", SCENES / "angioplasty" / "own.py", ".", *words, code=code).stderr
+        return run_script(self.folder, "angioplasty/own.py", ".", *words, code=code)
 
     def check(self):
-        self.run_in_folder(SIMULATE, "--scene", "scene.toml", "--check")
+        self.run_tool("simulate", "--scene", "scene.toml", "--check", report=False)
 
     def up_to(self, factor):
         """Runs the scene as far as this load factor. @return the report's result"""
-        scene = Path(self.folder.name) / "scene.toml"
+        scene = self.folder / "scene.toml"
         text = scene.read_text(encoding="utf-8")
         some = [f for f in json.loads(re.search(r"load_factors = (.*)", text)[1]) if f <= factor]
         scene.write_text(re.sub("load_factors = .*", f"load_factors = {some}", text), encoding="utf-8")
-        self.run_in_folder(SIMULATE, "--scene", "scene.toml", "out.hdf", "--report", "report.json", "--quiet")
-        return json.loads((Path(self.folder.name) / "report.json").read_text(encoding="utf-8"))["result"]
+        return self.run_tool("simulate", "--scene", "scene.toml", "out.hdf", "--quiet")["result"]
 
     def test_the_samples_meshes_make_a_scene(self):
-        with_meshes("angioplasty", self.folder.name)
+        with_meshes("angioplasty", self.folder)
         place = ("from=0,0,-6", "to=0,0,6", "inflated=4.5")
         for words in (("vessel.ply", "deposit.vtk", "push=24", "friction=0.1"), ("vessel.ply", "pressure=80"),
                       ("vessel.ply", "hold=0,0,15,6", "hold=0,0,-15,6")):
@@ -173,8 +158,7 @@ class OwnVessel(unittest.TestCase):
     @unittest.skipUnless((SHARED / "paper").is_dir(), f"the shared meshes of the paper are absent ({SHARED})")
     def test_the_papers_vessel_and_deposits(self):
         paper = SHARED / "paper"
-        self.run_in_folder("/usr/bin/python3", "-B", SCENES / "angioplasty" / "paper.py", paper / "vesselScale.msh",
-                           paper / "stenosis2.xml", ".")
+        run_script(self.folder, "angioplasty/paper.py", paper / "vesselScale.msh", paper / "stenosis2.xml", ".")
         self.own("vessel.ply", "deposits.vtk", "from=-8,0,0", "to=8,0,0", "inflated=0.7", "collapsed=0.15", "push=20", "wall=0.3")
         result = self.up_to(0.23)
         self.assertEqual((result["shells"], result["tetrahedra"]), (160, 2978))
@@ -187,8 +171,8 @@ class OwnVessel(unittest.TestCase):
     def test_a_real_aneurysm(self):
         surface = SHARED / "meshes" / "sofa_aneurysm3D_1.obj"
         unit = ("--mesh-unit", "mm", "--quiet")
-        self.run_in_folder(BIN / "tunica-decimate", surface, "coarse.ply", "--triangles", 900, "--min-angle", 20, *unit)
-        self.run_in_folder(BIN / "tunica-relax", "coarse.ply", surface, "vessel.ply", "--refine", "--tolerance", "1%", *unit)
+        self.run_tool("decimate", surface, "coarse.ply", "--triangles", 900, "--min-angle", 20, *unit)
+        self.run_tool("relax", "coarse.ply", surface, "vessel.ply", "--refine", "--tolerance", "1%", *unit)
         self.own("vessel.ply", "from=-11.5,1.8,-5.8", "to=-8.6,2.55,-3.7", "inflated=1.6", "collapsed=0.6", "wall=0.3",
                  "hold=-19.6,-17.3,-13.3,2.6", "hold=-3.1,-6.05,5.6,2.2", "hold=4.9,-5.3,-12.9,1.3")
         self.check()

@@ -7,13 +7,12 @@ import math
 import os
 import random
 import re
-import subprocess
-import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-CHART = Path(os.environ["TUNICA_BIN"]) / "tunica-chart"
+from running import ToolTest
+
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -33,11 +32,11 @@ def probe(times, scale):
             "rotation_rad": [[0, 0, 0]] * len(times)}
 
 
-class ChartCase(unittest.TestCase):
+class ChartCase(ToolTest):
+    verb = "chart"
+
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="tunica-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
+        super().setUp()
         self.out = self.folder / "chart.svg"
 
     def write(self, name, content):
@@ -45,28 +44,18 @@ class ChartCase(unittest.TestCase):
         path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
         return str(path)
 
-    def run_chart(self, *arguments):
-        return subprocess.run([str(CHART), *map(str, arguments)], capture_output=True, text=True, timeout=60,
-                              errors="replace")
-
     def draw(self, *arguments, warnings=0):
-        run = self.run_chart(*arguments, "-o", self.out, "--csv", self.folder / "chart.csv", "--force")
-        self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertEqual(run.stderr.count("warning"), warnings, run.stderr)
+        self.run_tool(*arguments, "-o", self.out, "--csv", self.folder / "chart.csv", "--force")
+        self.assertEqual(self.done.stderr.count("warning"), warnings, self.done.stderr)
         root = ElementTree.parse(self.out).getroot()
         with open(self.folder / "chart.csv", newline="", encoding="utf-8", errors="replace") as file:
             rows = list(csv.reader(file))
         return root, rows[0], rows[1:]
 
-    def refused(self, code, *arguments, says=()):
-        run = self.run_chart(*arguments, "-o", self.out)
-        self.assertEqual(run.returncode, code, run.stderr)
-        self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
-        self.assertTrue(run.stderr.startswith("tunica-chart: "), run.stderr)
-        for text in says:
-            self.assertIn(text, run.stderr)
+    def refused(self, code, *arguments, **options):
+        self.run_tool(*arguments, "-o", self.out, code=code, **options)
+        self.assertEqual(self.done.stderr.count("\n"), 1, self.done.stderr)
         self.assertEqual(sorted(p.name for p in self.folder.glob("chart.svg*")), [], "an output was left behind")
-        return run.stderr
 
 
 def marks(root):
@@ -215,11 +204,8 @@ class WhatIsDrawn(ChartCase):
         path = os.path.join(os.fsencode(self.folder), b"a,\"\xff\n<b>.json")
         with open(path, "w", encoding="utf-8") as file:
             json.dump(relax(1, 1.0, 1.0), file)
-        run = subprocess.run([str(CHART), path, "-o", str(self.out), "--series", "file", "--label", "file", "--report",
-                              str(self.folder / "r.json"), "--csv", str(self.folder / "c.csv")], capture_output=True)
-        self.assertEqual(run.returncode, 0, run.stderr)
+        self.run_tool(path, "-o", self.out, "--series", "file", "--label", "file", "--csv", "c.csv")
         ElementTree.parse(self.out)
-        json.loads((self.folder / "r.json").read_bytes())
 
     def test_same_bytes_every_time(self):
         runs = [self.write(f"{i}.json", relax(i, 1.0 / i, float(i))) for i in range(1, 20)]
@@ -269,8 +255,7 @@ class WhatIsDrawn(ChartCase):
         self.assertIn("y = 1000", texts(root))
         self.assertIn("1,000", texts(root), "the axis does not reach the guide")
         for line in ("steep", "1e999", "nan"):
-            refused = self.run_chart(run, "-o", self.folder / "none.svg", "--guide", line)
-            self.assertEqual(refused.returncode, 2, line)
+            self.run_tool(run, "-o", "none.svg", "--guide", line, code=2)
 
     def test_commands_stand_in_the_table(self):
         _, head, rows = self.draw(self.write("a.json", {**relax(1, 0.5, 1.0), "command": "tunica-relax a 'b c'"}))
@@ -285,9 +270,8 @@ class WhatIsDrawn(ChartCase):
 
     def test_report_of_the_run(self):
         runs = [self.write("a.json", relax(1, 1.0, 1.0)), self.write("b.json", report(ok=False))]
-        self.draw(*runs, "--report", self.folder / "r.json", warnings=1)
-        made = json.loads((self.folder / "r.json").read_text())
-        self.assertTrue(made["ok"])
+        self.draw(*runs, warnings=1)
+        made = self.done.report
         self.assertEqual(len(made["inputs"]), 2)
         self.assertEqual([Path(entry["path"]).name for entry in made["outputs"]], ["chart.svg", "chart.csv"])
         self.assertEqual(made["result"]["marks"], 1)
@@ -331,11 +315,10 @@ class Reference(ChartCase):
         self.draw(stating("a.json", 4.4, membrane="opt"), "--reference", fine)
         other = stating("b.json", 2.0, pressure_mpa=0.008)
         self.draw(other, fine, "--reference", fine, warnings=1)
-        run = self.run_chart(other, fine, "--reference", fine, "-o", self.out, "--force")
-        for text in ("1 of 2 runs", "b.json", "pressure_mpa 0.008, 0.016 in the reference"):
-            self.assertIn(text, run.stderr)
+        self.run_tool(other, fine, "--reference", fine, "-o", self.out, "--force",
+                      says=("1 of 2 runs", "b.json", "pressure_mpa 0.008, 0.016 in the reference"))
 
-    def test_distance(self):
+    def test_a_distance_is_held_against_the_reference(self):
         fine = self.write("fine.json", relax(9, 0.5, 1.0))
         _, _, rows = self.draw(self.write("a.json", relax(1, 2.0, 1.0)), "--reference", fine)
         self.assertEqual(float(rows[0][5]), 1.5)
@@ -353,7 +336,7 @@ class Reference(ChartCase):
         self.refused(3, run, "--reference", fine, says=["nothing to draw"])
         self.refused(3, run, "--reference", fine, "--y", "result.strain_energy_mj", says=["fine.json"])
 
-    def test_bad_references(self):
+    def test_references_that_do_not_fit_are_named(self):
         run = self.simulation("a.json", max_displacement_mm=1.0, probes={"p": probe([0, 1], 1)})
         self.refused(3, run, "--reference", self.write("f.json", report(ok=False)), says=["f.json", "failed"])
         self.refused(3, run, "--reference", self.folder / "none.json", says=["none.json"])
@@ -371,18 +354,14 @@ class WhatIsLeftOut(ChartCase):
         bad = self.write("bad.json", report(ok=False))
         _, _, rows = self.draw(bad, good, warnings=1)
         self.assertEqual(len(rows), 1)
-        run = self.run_chart(bad, bad, "-o", self.folder / "none.svg")
-        self.assertEqual(run.returncode, 3)
-        self.assertIn("every run failed", run.stderr)
+        self.run_tool(bad, bad, "-o", "none.svg", code=3, says="every run failed")
         self.assertFalse((self.folder / "none.svg").exists())
 
-    def test_null_values(self):
+    def test_runs_without_a_value_are_left_out_with_a_warning(self):
         null = self.write("null.json", relax(1, None, 1.0))
         _, _, rows = self.draw(null, self.write("good.json", relax(1, 1.0, 1.0)), warnings=1)
         self.assertEqual(len(rows), 1)
-        run = self.run_chart(null, "-o", self.folder / "none.svg")
-        self.assertEqual(run.returncode, 3)
-        self.assertIn("nothing to draw", run.stderr)
+        self.run_tool(null, "-o", "none.svg", code=3, says="nothing to draw")
 
     def test_one_point_equal_values_zero_and_negative(self):
         for values in ([(1, 1)], [(1, 1)] * 3, [(0, 0)], [(0, 1), (5, 1)], [(-5, 3), (900, 3)], [(0, 0.1), (1, 0), (1000, 5)],
@@ -436,7 +415,7 @@ class WhatIsRefused(ChartCase):
         path = self.folder / "huge.json"
         with open(path, "wb") as file:
             file.truncate(1 << 40)
-        self.refused(3, path, says=["huge.json", "too large"])
+        self.refused(3, path, says=["huge.json", "too large"], report=False)  # which would say the sum of its bytes
 
     def test_random_damage_never_crashes(self):
         generator = random.Random(7)
@@ -446,39 +425,35 @@ class WhatIsRefused(ChartCase):
             data = bytearray(good)
             for _ in range(generator.randint(1, 5)):
                 data[generator.randrange(len(data))] = generator.choice(b'{}[]",:0e-.\xff\x00n')
-            run = self.run_chart(self.write("x.json", bytes(data)), "-o", self.out, "--force")
-            self.assertIn(run.returncode, (0, 3), f"round {round}: {run.stderr}")
+            with self.subTest(round=round):
+                self.run_tool(self.write("x.json", bytes(data)), "-o", self.out, "--force", code=(0, 3))
 
     def test_existing_outputs_are_kept_without_force(self):
         a = self.write("a.json", relax(1, 1.0, 1.0))
         self.out.write_text("mine")
-        run = self.run_chart(a, "-o", self.out)
-        self.assertEqual(run.returncode, 5)
-        self.assertIn("--force", run.stderr)
+        self.run_tool(a, "-o", self.out, code=5, says="--force")
         self.assertEqual(self.out.read_text(), "mine")
         table = self.folder / "t.csv"
         table.write_text("mine")
-        run = self.run_chart(a, "-o", self.folder / "new.svg", "--csv", table)
-        self.assertEqual(run.returncode, 5)
+        self.run_tool(a, "-o", "new.svg", "--csv", table, code=5)
         self.assertEqual(table.read_text(), "mine")
         self.assertFalse((self.folder / "new.svg").exists())
-        self.assertEqual(self.run_chart(a, "-o", self.out, "--force").returncode, 0)
+        self.run_tool(a, "-o", self.out, "--force")
         self.assertIn("<svg", self.out.read_text())
-        self.assertEqual(self.run_chart(a, "-o", self.folder / "no" / "c.svg").returncode, 5)
+        self.run_tool(a, "-o", "no/c.svg", code=5)
 
-    def test_usage(self):
+    def test_wrong_usage_is_2(self):
         a = self.write("a.json", relax(1, 1.0, 1.0))
-        self.assertEqual(self.run_chart(a).returncode, 2)
-        self.assertEqual(self.run_chart("-o", self.out).returncode, 2)
+        self.run_tool(a, code=2)
+        self.run_tool("-o", self.out, code=2)
         self.refused(2, a, "--x-scale", "cubic")
         self.refused(2, a, "--nonsense")
-        self.assertEqual(self.run_chart(a, "-o", self.out, "--csv", self.out).returncode, 2)
+        self.run_tool(a, "-o", self.out, "--csv", self.out, code=2)
 
     def test_help_and_version(self):
-        run = self.run_chart("--help")
-        self.assertEqual(run.returncode, 0)
-        self.assertIn("Example", run.stdout)
-        self.assertEqual(self.run_chart("--version").returncode, 0)
+        self.run_tool("--help", report=False)
+        self.assertIn("Example", self.done.stdout)
+        self.run_tool("--version", report=False)
 
 
 if __name__ == "__main__":

@@ -5,15 +5,15 @@ import struct
 import unittest
 
 import meshes
-from whole_tool import WholeTool
+from running import ToolTest
 
 
 def interval_holds(interval, truth, slack=0.0):
     return interval["lower"] <= truth + slack and truth <= interval["upper"] + slack
 
 
-class Compare(WholeTool):
-    tool = "compare"
+class Compare(ToolTest):
+    verb = "compare"
 
     def setUp(self):
         super().setUp()
@@ -26,7 +26,7 @@ class Compare(WholeTool):
         meshes.write_ply(self.path("shell.ply"), vertices, triangles, self.normals, ["SPACE=LPS", "surface=comas"])
         meshes.write_ply(self.path("sphere.ply"), *meshes.sphere(6, 10.0))
 
-    def test_offset_planes(self):
+    def test_planes_apart_are_at_their_distance(self):
         report = self.run_tool("plane.ply", "offset.ply")
         result = report["result"]
         self.assertEqual(result["diagonal_mm"], 5)
@@ -47,7 +47,7 @@ class Compare(WholeTool):
         self.assertLessEqual(result["one_sided_percent"]["a_to_b"]["upper"], 0.0002)
         self.assertLessEqual(result["hausdorff_percent"]["upper"] - result["hausdorff_percent"]["lower"], 0.0001)
 
-    def test_identical(self):
+    def test_a_surface_is_at_no_distance_from_itself(self):
         result = self.run_tool("sphere.ply", "sphere.ply")["result"]
         self.assertEqual(result["hausdorff_mm"]["lower"], 0)
         self.assertLess(result["hausdorff_percent"]["upper"], 0.01)
@@ -70,7 +70,7 @@ class Compare(WholeTool):
         self.run_tool("ras.ply", "lps.ply", code=3, says="SPACE=LPS")
         self.run_tool("lps.ply", "ras.ply", code=3, says="SPACE=RAS")
         self.run_tool("ras.ply", "sphere.ply", "--map", "map.ply")  # the sphere names none
-        self.assertIn("comment SPACE=RAS", meshes.read_ply(self.path("map.ply"))[0])
+        self.assertIn("SPACE=RAS", meshes.Ply(self.path("map.ply")).comments)
 
     def test_shells_that_are_read_flat_are_said(self):
         for files, flags, kinds in [(["shell.ply", "sphere.ply"], [], 1), (["shell.ply", "sphere.ply"], ["--shell"], 0),
@@ -124,17 +124,16 @@ class Compare(WholeTool):
         for flags in [[], ["--shell"]]:
             result = self.run_tool("shell.ply", "sphere.ply", *flags, "--map", "map.ply", "--picture", "map.png",
                                    "--force")["result"]
-            header, rows, triangles = meshes.read_ply(self.path("map.ply"))
-            self.assertIn("property double quality", header)
-            self.assertGreater(len(triangles), 2000)
-            largest = max(row[-1] for row in rows)
+            ply = meshes.Ply(self.path("map.ply"))
+            self.assertGreater(len(ply.triangles), 2000)
+            largest = ply.fields["quality"].max()
             upper = result["one_sided_percent"]["a_to_b"]["upper"] * result["diagonal_mm"] / 100
             self.assertLessEqual(largest, upper)
             self.assertGreater(largest, 0.8 * upper)
             with open(self.path("map.png"), "rb") as file:
                 self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
 
-    def test_picture_range(self):
+    def test_a_picture_range_changes_the_colours_and_belongs_to_a_picture(self):
         pictures = []
         for range_of_colours in ([], ["--picture-range", "50%"], ["--picture-range", "0.01%"]):
             self.run_tool("plane.ply", "offset.ply", "--picture", "map.png", *range_of_colours, "--force")
@@ -145,7 +144,7 @@ class Compare(WholeTool):
         self.run_tool("plane.ply", "offset.ply", "--picture", "a.png", "--picture-range", "1", code=2, says="--picture-range")
         self.run_tool("plane.ply", "offset.ply", "--picture", "a.png", "--picture-range", "0%", code=2, says="--picture-range")
 
-    def test_max(self):
+    def test_a_distance_beyond_max_is_4_and_certain(self):
         self.run_tool("plane.ply", "offset.ply", "--max", "0.26mm")
         self.run_tool("plane.ply", "offset.ply", "--max", "5.0001%")
         report = self.run_tool("plane.ply", "offset.ply", "--max", "0.2mm", code=4, says="at least")
@@ -155,7 +154,7 @@ class Compare(WholeTool):
         self.run_tool("plane.ply", "offset.ply", "--tolerance", "50%", "--max", "0.249mm", code=4)
         self.run_tool("plane.ply", "offset.ply", "--tolerance", "50%", "--max", "0.25mm", code=4, says="certainly")
 
-    def test_usage(self):
+    def test_wrong_usage_is_2(self):
         for arguments in [["--tolerance", "0.01"], ["--tolerance", "0%"], ["--max", "1"], ["--nonsense"],
                           ["--mesh-unit", "inch"]]:
             self.run_tool("plane.ply", "offset.ply", *arguments, code=2)
@@ -165,7 +164,7 @@ class Compare(WholeTool):
         self.run_tool("plane.obj", "offset.ply", "--map", "m.ply", code=2, says="--mesh-unit")
         self.run_tool("plane.obj", "offset.ply", "--map", "m.ply", "--mesh-unit", "cm")
 
-    def test_bad_input(self):
+    def test_unfit_inputs_are_3(self):
         self.run_tool("absent.ply", "plane.ply", code=3, says="absent.ply")
         self.run_tool("plane.ply", "absent.ply", code=3, says="absent.ply")
         self.run_tool("plane.ply", "offset.ply", "--shell", code=3, says="normals")
@@ -210,7 +209,7 @@ class Compare(WholeTool):
             self.assertLessEqual(width, 0.01)
             self.assertLess(report["peak_mib"], 500)
 
-    def test_output_exists(self):
+    def test_an_existing_output_is_5_and_kept(self):
         with open(self.path("map.ply"), "w") as file:
             file.write("mine")
         self.run_tool("plane.ply", "offset.ply", "--map", "map.ply", code=5, says="map.ply")

@@ -1,29 +1,26 @@
 """tunica-decimate as its users run it: counts, errors kept, topology of the written file, each exit code."""
 import math
 import os
-import subprocess
 import unittest
 
 import meshes
-from whole_tool import WholeTool
-
-DATA = os.environ.get("TUNICA_SHARED_DATA", "")
+from running import SHARED, ToolTest
 
 
-class Decimate(WholeTool):
-    tool = "decimate"
+class Decimate(ToolTest):
+    verb = "decimate"
 
     def surface(self, name="in.ply", level=4):
         vertices, triangles = meshes.sphere(level, 20.0)
         meshes.write_ply(self.path(name), vertices, triangles, comments=["SPACE=RAS"])
         return vertices, triangles
 
-    def test_count(self):
+    def test_a_count_is_kept_with_the_topology(self):
         self.surface()
         report = self.run_tool("in.ply", "out.ply", "--triangles", 200)
         result = report["result"]
-        header, _, triangles = meshes.read_ply(self.path("out.ply"))
-        self.assertEqual(len(triangles), 200)
+        ply = meshes.Ply(self.path("out.ply"))
+        self.assertEqual(len(ply.triangles), 200)
         self.assertEqual(result["triangles"], 200)
         self.assertEqual(result["triangles_in"], 2048)
         self.assertTrue(result["manifold"])
@@ -32,10 +29,10 @@ class Decimate(WholeTool):
         self.assertGreater(result["hausdorff_percent"]["lower"], 0.1)
         self.assertGreater(result["min_angle_deg"], 1)
         self.assertGreater(result["mean_quality"], 0.5)
-        self.assertEqual(meshes.euler(triangles), 2)
-        self.assertTrue(meshes.directed_edges_are_unique(triangles))
-        self.assertIn("comment SPACE=RAS", header)
-        self.assertIn("comment units mm", header)
+        self.assertEqual(ply.euler(), 2)
+        self.assertTrue(ply.is_closed_oriented_manifold())
+        self.assertIn("SPACE=RAS", ply.comments)
+        self.assertIn("units mm", ply.comments)
         self.assertEqual(list(report["seconds"]), ["total", "read", "decimate", "measure", "write"])
 
     def test_max_error_in_percent_and_mm_agree(self):
@@ -62,7 +59,7 @@ class Decimate(WholeTool):
             self.assertEqual(report["warning_kinds"], [])
             self.assertEqual(report["result"]["repairs"]["joined_edges"], 128)
             self.assertEqual(report["result"]["boundary_loops"], 0)
-            self.assertEqual(meshes.euler(meshes.read_ply(self.path("out.ply"))[2]), 2)
+            self.assertEqual(meshes.Ply(self.path("out.ply")).euler(), 2)
 
     def test_a_ply_that_says_no_unit_is_told_what_it_is_taken_for(self):
         vertices, triangles = meshes.sphere(3, 10.0)
@@ -153,9 +150,9 @@ class Decimate(WholeTool):
         vertices, triangles = self.surface()
         meshes.write_ply(self.path("in.ply"), vertices, triangles, comments=["SPACE=LPS", "voxel 0.8 0.8 3 mm"])
         self.run_tool("in.ply", "out.ply", "--triangles", 200)
-        self.assertIn("comment voxel 0.8 0.8 3 mm", meshes.read_ply(self.path("out.ply"))[0])
+        self.assertIn("voxel 0.8 0.8 3 mm", meshes.Ply(self.path("out.ply")).comments)
 
-    def test_min_angle(self):
+    def test_a_smallest_angle_is_kept(self):
         self.surface()
         result = self.run_tool("in.ply", "out.ply", "--triangles", 300, "--min-angle", 20)["result"]
         self.assertGreaterEqual(result["min_angle_deg"], 20)
@@ -188,18 +185,15 @@ class Decimate(WholeTool):
             self.assertGreater(result["min_angle_deg"], 10)
             # That IN's own corners are the reason is said, with the angle.
             self.assertIs(result["min_angle_held"], True)
-            said = self.warnings("in.ply", "again.ply", "--min-angle", 20, "--max-error", "0.2mm")
+            said = self.run_tool("in.ply", "again.ply", "--min-angle", 20, "--max-error", "0.2mm", "--force")["warnings"]
             self.assertIn(f"the smallest angle is {result['min_angle_deg']:.3g} degrees", "\n".join(said))
             self.assertLess(result["min_angle_deg"], math.degrees(2 * math.atan(0.7 / 5)))
-            _, rows, faces = meshes.read_ply(self.path("out.ply"))
-            sharp = set()
-            for face in faces:
+            ply, sharp = meshes.Ply(self.path("out.ply")), set()
+            for face in ply.vertices[ply.triangles]:
                 for k in range(3):
-                    p, a, b = (rows[face[(k + m) % 3]] for m in range(3))
-                    u, v = [x - y for x, y in zip(a, p)], [x - y for x, y in zip(b, p)]
-                    cosine = sum(x * y for x, y in zip(u, v)) / math.hypot(*u) / math.hypot(*v)
-                    if cosine > math.cos(math.radians(20)):
-                        sharp.add(tuple(p[:2]))
+                    u, v = face[k - 2] - face[k], face[k - 1] - face[k]
+                    if u @ v / math.hypot(*u) / math.hypot(*v) > math.cos(math.radians(20)):
+                        sharp.add(tuple(face[k][:2]))
             self.assertEqual(sharp, {(i + 0.5, -5.0) for i in tips})
 
     def test_min_angle_that_cannot_be_held(self):
@@ -219,10 +213,10 @@ class Decimate(WholeTool):
         within = self.run_tool("in.ply", "out.ply", "--max-error", "1e-6mm", "--min-angle", 20, "--soft-angle", "--force")["result"]
         self.assertLessEqual(within["hausdorff_mm"]["upper"], 1e-6)
 
-    @unittest.skipUnless(os.path.isdir(os.path.join(DATA, "meshes")), "the real meshes are absent: skipped")
+    @unittest.skipUnless((SHARED / "meshes").is_dir(), "the real meshes are absent: skipped")
     def test_min_angle_on_real_organs(self):
         for name, count in [("gca_colon_90_20k.obj", 1500), ("sofaenv_gallbladder.stl", 500), ("vmtk_aorta_open.stl", 800)]:
-            given = os.path.join(DATA, "meshes", name)
+            given = SHARED / "meshes" / name
             result = self.run_tool(given, "out.ply", "--triangles", count, "--min-angle", 20, "--mesh-unit", "mm",
                                    "--force")["result"]
             self.assertGreaterEqual(result["min_angle_deg"], 20, name)
@@ -233,19 +227,19 @@ class Decimate(WholeTool):
         self.surface()
         self.run_tool("in.ply", "a.ply", "--max-error", "0.8%", "--threads", 1)
         self.run_tool("in.ply", "b.ply", "--max-error", "0.8%", "--threads", 4)
-        self.assertEqual(meshes.read_ply(self.path("a.ply"))[1:], meshes.read_ply(self.path("b.ply"))[1:])
+        a, b = meshes.Ply(self.path("a.ply")), meshes.Ply(self.path("b.ply"))
+        self.assertEqual((a.vertices.tolist(), a.triangles.tolist()), (b.vertices.tolist(), b.triangles.tolist()))
 
     def test_boundary_stays_on_its_circle(self):
         meshes.write_ply(self.path("in.ply"), *meshes.tube(64, 40))
         self.run_tool("in.ply", "out.ply", "--triangles", 150)
-        _, rows, triangles = meshes.read_ply(self.path("out.ply"))
-        rim = {v for edge in meshes.boundary_edges(triangles) for v in edge}
+        ply = meshes.Ply(self.path("out.ply"))
+        rim = ply.vertices[ply.rim()[:, 0]]
         self.assertGreaterEqual(len(rim), 6)
-        for v in rim:
-            x, y, z = rows[v][:3]
+        for x, y, z in rim:
             self.assertTrue(abs(z) < 1e-12 or abs(z - 4) < 1e-12)
             self.assertLess(abs((x * x + y * y) ** 0.5 - 1), 0.002)
-        self.assertEqual(meshes.euler(triangles), 0)
+        self.assertEqual(ply.euler(), 0)
 
     def test_a_fan_of_needles_takes_as_much_memory_as_any_mesh(self):
         n = 12_000
@@ -255,7 +249,7 @@ class Decimate(WholeTool):
         self.assertEqual(report["result"]["triangles"], 1200)
         self.assertLess(report["peak_mib"], 90)
 
-    def test_units(self):
+    def test_a_format_without_a_unit_claims_none(self):
         vertices, triangles = meshes.sphere(3)
         meshes.write_obj(self.path("in.obj"), vertices, triangles)
         report = self.run_tool("in.obj", "a.ply", "--triangles", 100)
@@ -267,25 +261,24 @@ class Decimate(WholeTool):
         cm = self.run_tool("in.obj", "b.ply", "--triangles", 100, "--mesh-unit", "cm")["result"]
         self.assertAlmostEqual(cm["diagonal_mm"], 10 * 12 ** 0.5)
 
-    def test_real_meshes(self):
+    def test_real_meshes_keep_their_topology(self):
         for name, chi in [("meshes/gca_colon_90_20k.obj", 0), ("meshes/vmtk_aorta_open.stl", -1)]:
-            path = os.path.join(DATA, name)
-            if not os.path.exists(path):
-                self.skipTest(path + " is absent")
+            path = SHARED / name
+            if not path.exists():
+                self.skipTest(f"{path} is absent")
             result = self.run_tool(path, "out.ply", "--triangles", 1500, "--force")["result"]
-            _, _, triangles = meshes.read_ply(self.path("out.ply"))
             self.assertTrue(result["manifold"])
-            self.assertEqual(meshes.euler(triangles), chi)
+            self.assertEqual(meshes.Ply(self.path("out.ply")).euler(), chi)
             self.assertLess(result["hausdorff_percent"]["upper"], 2)
 
     def test_real_mesh_that_is_not_manifold(self):
-        path = os.path.join(DATA, "meshes/awkward_colon_VHF_nonmanifold.obj")
-        if not os.path.exists(path):
-            self.skipTest(path + " is absent")
+        path = SHARED / "meshes" / "awkward_colon_VHF_nonmanifold.obj"
+        if not path.exists():
+            self.skipTest(f"{path} is absent")
         self.run_tool(path, "out.ply", "--triangles", 1500, code=3, says="195 edges are shared by three")
         self.assertFalse(self.exists("out.ply"))
 
-    def test_usage(self):
+    def test_wrong_usage_is_2(self):
         self.surface()
         for arguments in [[], ["--triangles", "0"], ["--triangles", "-5"], ["--triangles", "2.5"], ["--triangles", "x"],
                           ["--max-error", "1"], ["--max-error", "0%"], ["--max-error", "-1mm"], ["--nonsense"],
@@ -296,7 +289,7 @@ class Decimate(WholeTool):
         self.run_tool("in.ply", "out.ply", "--min-angle", 20, code=2, says="--triangles")
         self.assertFalse(self.exists("out.ply"))
 
-    def test_bad_input(self):
+    def test_unfit_inputs_are_3(self):
         self.run_tool("absent.ply", "out.ply", "--triangles", 100, code=3, says="absent.ply")
         vertices, triangles = self.surface()
         with open(self.path("in.ply"), "rb") as file:
@@ -318,14 +311,7 @@ class Decimate(WholeTool):
         meshes.write_ply(self.path("line.ply"), [(0.0, 0, 0), (1.0, 0, 0), (2.0, 0, 0), (4.0, 0, 0)],
                          [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])
         self.run_tool("line.ply", "out.ply", "--triangles", 4, code=3, says="line.ply: all of its triangles are without area")
-        self.assertFalse(os.path.exists(self.path("out.ply")))
-
-    def warnings(self, *arguments):
-        """What the tool warns of where it ends with 0."""
-        command = [os.path.join(os.environ["TUNICA_BIN"], "tunica-decimate"), *map(str, arguments), "--force"]
-        run = subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
-        self.assertEqual(run.returncode, 0, run.stderr)
-        return [line for line in run.stderr.splitlines() if "warning" in line]
+        self.assertFalse(self.exists("out.ply"))
 
     def test_poles_that_are_rings_of_vertices_are_closed(self):
         n, m = 24, 12
@@ -341,11 +327,11 @@ class Decimate(WholeTool):
             self.assertEqual((result["euler"], result["boundary_loops"]), (2, 0))
             self.assertEqual(result["longest_spike_mm"], 0)
             self.assertLess(result["hausdorff_percent"]["upper"], 5)
-        found = self.warnings("in.ply", "out.ply", "--triangles", 200)
+        found = self.run_tool("in.ply", "out.ply", "--triangles", 200, "--force")["warnings"]
         self.assertEqual(len(found), 1, found)
         self.assertIn("2 hole(s) whose rim was a single point are closed", found[0])
         self.surface("sound.ply")
-        self.assertEqual(self.warnings("sound.ply", "out.ply", "--triangles", 200), [])
+        self.assertEqual(self.run_tool("sound.ply", "out.ply", "--triangles", 200, "--force")["warnings"], [])
         self.assertEqual(self.run_tool("sound.ply", "out.ply", "--triangles", 200, "--force")["result"]["closed_loops"], 0)
 
     def test_spikes_without_area_go_as_far_as_the_error_allows(self):
@@ -364,7 +350,7 @@ class Decimate(WholeTool):
         self.assertAlmostEqual(gone["longest_spike_mm"], 2)
         self.assertGreater(gone["hausdorff_mm"]["lower"], 1.99)
         self.assertLessEqual(gone["hausdorff_mm"]["upper"], 2.5)
-        self.assertIn("up to 2 mm long, are taken away", self.warnings("in.ply", "out.ply", "--max-error", "2.5mm")[0])
+        self.assertIn("up to 2 mm long, are taken away", self.run_tool("in.ply", "out.ply", "--max-error", "2.5mm", "--force")["warnings"][0])
         for goal in [("--triangles", 60), ("--triangles", 100, "--min-angle", 20)]:
             counted = self.run_tool("in.ply", "out.ply", *goal, "--force")["result"]
             self.assertEqual(counted["degenerate_triangles"], 0)
@@ -375,7 +361,7 @@ class Decimate(WholeTool):
         self.assertLessEqual(kept["hausdorff_mm"]["upper"], 0.1)
         self.assertLess(kept["triangles"], 60)  # the rest of the surface is not held up by them
         self.assertIn("--max-error is too small for their spikes to go",
-                      self.warnings("in.ply", "out.ply", "--max-error", "0.1mm")[0])
+                      self.run_tool("in.ply", "out.ply", "--max-error", "0.1mm", "--force")["warnings"][0])
 
     def test_spikes_longer_than_the_error_exclude_an_angle(self):
         n = 12
@@ -390,7 +376,7 @@ class Decimate(WholeTool):
                                says="spikes without area")
         self.assertGreater(report["result"]["hausdorff_mm"]["upper"], 2.9)
         self.assertFalse(self.exists("out.ply"))
-        self.assertLess(len(meshes.read_ply(self.path("out.ply.part"))[2]), 100)
+        self.assertLess(len(meshes.Ply(self.path("out.ply.part")).triangles), 100)
         self.run_tool("in.ply", "out.ply", "--max-error", "3.5mm", "--min-angle", 20)
 
     def test_repair_drops_pieces_without_area(self):
@@ -413,10 +399,10 @@ class Decimate(WholeTool):
         result = self.run_tool("in.ply", "out.ply", "--triangles", 6)["result"]
         self.assertEqual(result["degenerate_triangles"], 2)
         self.assertEqual((result["euler"], result["boundary_loops"]), (1, 1))
-        found = self.warnings("in.ply", "out.ply", "--triangles", 6)
+        found = self.run_tool("in.ply", "out.ply", "--triangles", 6, "--force")["warnings"]
         self.assertIn("2 triangle(s) without area are left", found[0])
 
-    def test_repair(self):
+    def test_what_repair_mends_is_counted(self):
         vertices, triangles = self.surface()
         broken = [triangles[0][::-1]] + triangles[1:] + [triangles[7], (0, 0, 1),
                                                          (triangles[9][0], triangles[9][1], len(vertices))]
@@ -432,11 +418,11 @@ class Decimate(WholeTool):
         meshes.write_ply(self.path("none.ply"), [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 1)])
         self.run_tool("none.ply", "none_out.ply", "--triangles", 300, "--repair", code=3, says="no triangle is left")
 
-    @unittest.skipUnless(os.path.isdir(os.path.join(DATA, "meshes")), "the real meshes are absent: skipped")
+    @unittest.skipUnless((SHARED / "meshes").is_dir(), "the real meshes are absent: skipped")
     def test_repair_of_real_meshes(self):
         for name in ["awkward_colon_VHF_nonmanifold.obj", "awkward_liver_pieces.stl", "awkward_skull_polys.obj",
                      "awkward_aorta_3pieces.obj"]:
-            given = os.path.join(DATA, "meshes", name)
+            given = SHARED / "meshes" / name
             result = self.run_tool(given, "out.ply", "--triangles", 3000, "--repair", "--mesh-unit", "mm",
                                    "--force")["result"]
             self.assertTrue(result["manifold"], name)
@@ -450,25 +436,25 @@ class Decimate(WholeTool):
         report = self.run_tool("in.ply", "out.ply", "--triangles", 5, code=4, says="8 triangles are the fewest")
         self.assertEqual(report["result"]["triangles"], 8)
         self.assertFalse(self.exists("out.ply"))
-        self.assertEqual(len(meshes.read_ply(self.path("out.ply.part"))[2]), 8)
+        self.assertEqual(len(meshes.Ply(self.path("out.ply.part")).triangles), 8)
 
     def test_count_and_error_that_exclude_each_other(self):
         self.surface()
         report = self.run_tool("in.ply", "out.ply", "--triangles", 20, "--max-error", "0.5%", code=4, says="--max-error")
         self.assertLessEqual(report["result"]["hausdorff_percent"]["upper"], 0.5)
-        self.assertEqual(len(meshes.read_ply(self.path("out.ply.part"))[2]), report["result"]["triangles"])
+        self.assertEqual(len(meshes.Ply(self.path("out.ply.part")).triangles), report["result"]["triangles"])
         self.run_tool("in.ply", "out.ply", "--max-error", "1e-30mm", code=4, says="double precision")
         vertices, triangles = meshes.sphere(3)
         meshes.write_ply(self.path("long.ply"), [(x, y, 4 * z) for x, y, z in vertices], triangles, comments=["units mm"])
         self.run_tool("long.ply", "angles.ply", "--max-error", "1e-7mm", "--min-angle", 35, code=4, says="keeps both")
 
-    def test_output(self):
+    def test_an_existing_output_is_5_unless_forced(self):
         self.surface()
         self.run_tool("in.ply", "out.ply", "--triangles", 100)
         self.run_tool("in.ply", "out.ply", "--triangles", 50, code=5, says="out.ply")
-        self.assertEqual(len(meshes.read_ply(self.path("out.ply"))[2]), 100)
+        self.assertEqual(len(meshes.Ply(self.path("out.ply")).triangles), 100)
         self.run_tool("in.ply", "out.ply", "--triangles", 50, "--force")
-        self.assertEqual(len(meshes.read_ply(self.path("out.ply"))[2]), 50)
+        self.assertEqual(len(meshes.Ply(self.path("out.ply")).triangles), 50)
         self.run_tool("in.ply", "absent/out.ply", "--triangles", 50, code=5)
 
     def test_output_through_a_symbolic_link(self):
@@ -481,7 +467,7 @@ class Decimate(WholeTool):
             os.symlink(name, self.path(link))
             self.run_tool("in.ply", link, "--triangles", 50, "--force")
             self.assertTrue(os.path.islink(self.path(link)))
-            self.assertEqual(len(meshes.read_ply(self.path(name))[2]), 50)
+            self.assertEqual(len(meshes.Ply(self.path(name)).triangles), 50)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,17 @@
 """--cut: surfaces opened along planes; what --info says of where labels are; OPEN that opens nothing."""
-import json
-import os
-import pathlib
-import subprocess
-import tempfile
 import unittest
 
 import nibabel
 import numpy
-
-from volumes import Ply
-
-EXTRACT = pathlib.Path(os.environ["TUNICA_BIN"]) / "tunica-extract"
+from meshes import Ply
+from running import ToolTest
 
 
-class Cuts(unittest.TestCase):
+class Cuts(ToolTest):
+    verb = "extract"
+
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        super().setUp()
         # A vessel of radius 6 mm along z, from 5 to 44 mm, and a ball cut by the border; voxels of 1 mm.
         i, j, k = numpy.mgrid[:40, :30, :50]
         data = numpy.zeros((40, 30, 50), numpy.uint8)
@@ -27,17 +20,8 @@ class Cuts(unittest.TestCase):
         data[30, 2, 3] = 2
         nibabel.save(nibabel.Nifti1Image(data, numpy.eye(4)), self.folder / "v.nii.gz")
 
-    def extract(self, *words, code=0):
-        report = self.folder / "report.json"
-        done = subprocess.run([EXTRACT, "v.nii.gz", *words, "--report", report, "--force"], cwd=self.folder, check=False,
-                              capture_output=True, text=True)
-        self.assertEqual(done.returncode, code, done.stderr)
-        return json.loads(report.read_text()) if code == 0 else done.stderr
-
-    def rims(self, mesh):
-        """The rims' edges, by their ends: each once, against the order of its triangle."""
-        edges = {(a, b) for a, b in mesh.edges()}
-        return [edge for edge in edges if edge[::-1] not in edges]
+    def extract(self, *words, **options):
+        return self.run_tool("v.nii.gz", *words, "--force", **options)
 
     def test_both_ends_are_cut_flat(self):
         for smooth, low, high in (("none", 10.3, 33.0), ("staircase", 12.5, 38.49), ("1mm", 9.0, 41.0)):
@@ -48,8 +32,7 @@ class Cuts(unittest.TestCase):
             mesh = Ply(self.folder / "o.ply")
             self.assertAlmostEqual(mesh.vertices[:, 2].min(), low, 9)
             self.assertAlmostEqual(mesh.vertices[:, 2].max(), high, 9)
-            ends = numpy.unique(numpy.array(self.rims(mesh)))
-            z = mesh.vertices[ends, 2]
+            z = mesh.vertices[mesh.rim(), 2]
             self.assertLess(numpy.minimum(abs(z - low), abs(z - high)).max(), 1e-9)
             corners = mesh.vertices[mesh.triangles]
             areas = numpy.linalg.norm(numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -74,10 +57,9 @@ class Cuts(unittest.TestCase):
                 self.assertEqual("border cuts" in warnings, said, (label, words, more, warnings))
 
     def test_what_cannot_be_cut_is_said(self):
-        self.assertIn("reaches from", self.extract("o.ply", "--label", "1", "--cut", "above z=90mm", code=3))
-        self.assertIn("write 'above z=40mm'", self.extract("o.ply", "--label", "1", "--cut", "z=40mm", code=2))
-        self.assertIn("repeat --cut", self.extract("o.ply", "--label", "1", "--cut", "above z=40mm; below z=10mm", code=2))
-        self.assertIn("no unit", self.extract("o.ply", "--label", "1", "--cut", "above z=40", code=2))
+        for cut, code, says in (("above z=90mm", 3, "reaches from"), ("z=40mm", 2, "write 'above z=40mm'"),
+                                ("above z=40mm; below z=10mm", 2, "repeat --cut"), ("above z=40", 2, "no unit")):
+            self.extract("o.ply", "--label", "1", "--cut", cut, code=code, says=says)
         self.assertFalse((self.folder / "o.ply").exists())
 
     def test_an_open_border_that_opens_nothing_is_said(self):

@@ -1,17 +1,12 @@
 """Where the voxels of a NIfTI file lie: as nibabel has it, to the last bit."""
-import json
-import os
-import pathlib
-import subprocess
-import tempfile
 import unittest
 
 import nibabel
 import numpy as np
+from meshes import Ply
+from running import ToolTest
+from volumes import LPS
 
-from volumes import LPS, Ply
-
-EXTRACT = os.path.join(os.environ["TUNICA_BIN"], "tunica-extract")
 UNITS = {"mm": 1.0, "meter": 1000.0, "micron": 0.001}
 
 
@@ -32,11 +27,8 @@ def nifti1_io(header):
         [2 * (b * d - a * c) * x, 2 * (c * d + a * b) * y, (a * a + d * d - c * c - b * b) * z, header["qoffset_z"]]])
 
 
-class Geometry(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="tunica-geometry-")
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+class Geometry(ToolTest):
+    verb = "extract"
 
     def volume(self, kind, random, quaternion=None, both=False):
         """A volume with one voxel of label 1 and a header of random numbers."""
@@ -63,14 +55,8 @@ class Geometry(unittest.TestCase):
             file.write(header.binaryblock + bytes(4) + values.tobytes(order="F"))
         return path, nibabel.load(path).header
 
-    def run_extract(self, *arguments):
-        done = subprocess.run([EXTRACT, *map(str, arguments), "--report", self.folder / "report.json", "--force"],
-                              capture_output=True, text=True, timeout=60, check=False)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return json.loads((self.folder / "report.json").read_text(encoding="utf-8"))["result"]
-
     def check(self, path, expected, *more):
-        info = self.run_extract(path, "--info", *more)
+        info = self.run_tool(path, "--info", *more)["result"]
         ours = np.array(info["voxel_to_world_mm"])
         np.testing.assert_array_equal(ours, expected[:3])
         return info
@@ -95,7 +81,7 @@ class Geometry(unittest.TestCase):
                 if abs(np.linalg.det(best)) < 1e-3 * unit**3:
                     continue
                 # One voxel becomes six corners, half a voxel from its middle along each axis.
-                self.run_extract(path, self.folder / "one.ply", "--label", "1")
+                self.run_tool(path, "one.ply", "--label", "1", "--force")
                 corners = Ply(self.folder / "one.ply").vertices
                 indices = np.array([2, 1, 1]) + 0.5 * np.vstack([np.eye(3), -np.eye(3)])
                 there = indices @ (LPS @ best)[:3, :3].T + (LPS @ best)[:3, 3]
@@ -112,7 +98,7 @@ class Geometry(unittest.TestCase):
             for kind in (nibabel.Nifti1Image, nibabel.Nifti2Image):
                 path, header = self.volume(kind, random, quaternion=(1e-4, *axis))
                 unit = UNITS[header.get_xyzt_units()[0]]
-                info = self.run_extract(path, "--info")
+                info = self.run_tool(path, "--info")["result"]
                 ours = LPS[:3, :3] @ np.array(info["voxel_to_world_mm"])
                 np.testing.assert_allclose(ours, unit * nifti1_io(header), rtol=0, atol=1e-12 * unit * 300)
                 np.testing.assert_allclose(ours, unit * header.get_qform()[:3], rtol=0, atol=3e-3 * unit)

@@ -1,15 +1,11 @@
 """tunica-extract: volumes of the kinds that other programs write, which were read wrong without a word."""
 import gzip
-import pathlib
 import struct
-import sys
 import unittest
 
 import nibabel
 import numpy
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from test_extract import ExtractTest, ball  # noqa: E402
+from volumes import ExtractTest, ball
 
 
 def box(shape, first, last):
@@ -18,13 +14,7 @@ def box(shape, first, last):
     return array
 
 
-class Kinds(ExtractTest):
-    def voxels(self, *arguments):
-        record, stderr = self.run_tool(*arguments)
-        return record["result"]["voxel_volume_mm3"], record, stderr
-
-
-class Segments(Kinds):
+class Segments(ExtractTest):
     """Of 3D Slicer before 4.11: a layer per segment, and neither SegmentN_Layer nor SegmentN_LabelValue."""
 
     def setUp(self):
@@ -44,10 +34,10 @@ class Segments(Kinds):
 
     def test_their_layer_follows_from_the_name(self):
         for organ, name in zip(self.organs, self.names):
-            self.assertEqual(self.voxels(self.file, self.out, "--label", name)[0], 2 * organ.sum(), name)
-        self.assertEqual(self.voxels(self.file, self.out, "--label", "rectum", "--layer", "2")[0],
+            self.assertEqual(self.voxels(self.file, self.out, "--label", name), 2 * organ.sum(), name)
+        self.assertEqual(self.voxels(self.file, self.out, "--label", "rectum", "--layer", "2"),
                          2 * self.organs[2].sum())
-        self.assertEqual(self.voxels(self.file, self.out, "--label", "1", "--layer", "1")[0], 2 * self.organs[1].sum())
+        self.assertEqual(self.voxels(self.file, self.out, "--label", "1", "--layer", "1"), 2 * self.organs[1].sum())
 
     def test_of_another_layer_are_refused(self):
         self.out.unlink(missing_ok=True)
@@ -60,21 +50,20 @@ class Segments(Kinds):
 
     def test_in_a_file_of_three_dimensions(self):
         one = self.segmentation(self.organs[1], ["prostate"], "(1,0,0) (0,1,0) (0,0,2)", "", "one.seg.nrrd")
-        self.assertEqual(self.voxels(one, self.out, "--label", "prostate")[0], 2 * self.organs[1].sum())
+        self.assertEqual(self.voxels(one, self.out, "--label", "prostate"), 2 * self.organs[1].sum())
         two = self.segmentation(self.organs[1], ["prostate", "seed"], "(1,0,0) (0,1,0) (0,0,2)", "", "two.seg.nrrd")
-        _, record, stderr = self.voxels(two, self.out, "--label", "seed")
-        self.assertIn("the label 1 is called 'prostate' and 'seed'", stderr)
+        self.voxels(two, self.out, "--label", "seed")
+        self.assertIn("the label 1 is called 'prostate' and 'seed'", self.done.stderr)
 
     def test_names_of_one_value_in_a_table_are_told(self):
         volume = self.nifti(ball().astype(numpy.uint8), name="scan.nii.gz")
         (self.folder / "scan.tsv").write_text("index\tname\n1\taorta\n1\ttrachea\n")
         for arguments in ([self.out, "--label", "aorta"], [self.out, "--label", "1"], ["--info"]):
-            _, stderr = self.run_tool(volume, *arguments)
-            self.assertIn("scan.tsv: the label 1 is called 'aorta' and 'trachea'", stderr)
-        self.assertIn("aorta / trachea", self.stdout)
+            self.run_tool(volume, *arguments, says="scan.tsv: the label 1 is called 'aorta' and 'trachea'")
+        self.assertIn("aorta / trachea", self.done.stdout)
 
 
-class WholeNumbers(Kinds):
+class WholeNumbers(ExtractTest):
     def labels(self):
         labels = ball() * 3.0
         labels[6:8, 6:8, 6:8] = 6
@@ -95,13 +84,13 @@ class WholeNumbers(Kinds):
     def check(self, path):
         labels = self.labels()
         for value in (3, 6, 9):
-            volume, record, stderr = self.voxels(path, self.out, "--label", value)
+            volume = self.voxels(path, self.out, "--label", value)
             self.assertEqual(volume, (labels == value).sum())
-            self.assertIn("not quite whole numbers", " ".join(record["notes"]))
-            self.assertNotIn("warning: " + str(path), stderr)
-        record, _ = self.run_tool(path, "--info")
+            self.assertIn("not quite whole numbers", " ".join(self.done.report["notes"]))
+            self.assertNotIn("warning: " + str(path), self.done.stderr)
+        record = self.run_tool(path, "--info")
         self.assertEqual([label["label"] for label in record["result"]["labels"]], [3, 6, 9])
-        record, _ = self.run_tool(path, self.folder / "{label}.ply", "--all-labels")
+        record = self.run_tool(path, self.folder / "{label}.ply", "--all-labels")
         self.assertEqual(record["result"]["labels"]["6"]["voxel_volume_mm3"], 8)
 
     def test_scaled_by_nibabel(self):
@@ -120,7 +109,7 @@ class WholeNumbers(Kinds):
         raw = bytearray(path.read_bytes())
         raw[112:120] = struct.pack("<ff", 1 / 255, 0)
         path.write_bytes(raw)
-        self.assertEqual(self.voxels(path, self.out, "--label", 1)[0], mask.sum())
+        self.assertEqual(self.voxels(path, self.out, "--label", 1), mask.sum())
 
     def test_between_them_are_refused(self):
         def halfway(value):
@@ -135,7 +124,7 @@ class WholeNumbers(Kinds):
             self.refuse(3, path, self.out, "--label", label, saying=[*saying, isovalue])
             self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=saying)
             self.run_tool(path, "--info")
-            self.assertIn(f"a grey volume: {saying[0]}", self.stdout)
+            self.assertIn(f"a grey volume: {saying[0]}", self.done.stdout)
             self.run_tool(path, self.out, *isovalue.split())
 
     def test_beyond_doubles_are_refused(self):
@@ -150,11 +139,11 @@ class WholeNumbers(Kinds):
             path = self.nifti((ball() * label).astype(kind))
             self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=["is a grey volume"])
             self.run_tool(path, "--info")
-            self.assertIn("a grey volume", self.stdout)
+            self.assertIn("a grey volume", self.done.stdout)
         self.run_tool(self.nifti(ball() * 2.0 ** 53), self.folder / "{label}.ply", "--all-labels")
 
 
-class Headers(Kinds):
+class Headers(ExtractTest):
     def test_an_sform_of_zeros_gives_way_to_the_qform(self):
         mask = ball()
         image = nibabel.Nifti1Image(mask.astype(numpy.uint8), numpy.diag([-0.8, 0.7, 1.5, 1]))
@@ -162,15 +151,15 @@ class Headers(Kinds):
         image.set_sform(image.affine, 1)
         path = self.folder / "v.nii"
         image.to_filename(path)
-        good, _, _ = self.voxels(path, self.out, "--label", 1)
+        good = self.voxels(path, self.out, "--label", 1)
         surface = self.out.read_bytes().split(b"end_header")[1]
         raw = bytearray(path.read_bytes())
         raw[280:328] = bytes(48)
         path.write_bytes(raw)
-        volume, record, stderr = self.voxels(path, self.out, "--label", 1)
+        volume = self.voxels(path, self.out, "--label", 1)
         self.assertEqual(volume, good)
         self.assertEqual(self.out.read_bytes().split(b"end_header")[1], surface)
-        self.assertIn("its sform is all zero: the qform is used instead", stderr)
+        self.assertIn("its sform is all zero: the qform is used instead", self.done.stderr)
         raw[252:254] = bytes(2)
         path.write_bytes(raw)
         self.out.unlink()
@@ -179,28 +168,27 @@ class Headers(Kinds):
     def test_channels_before_space(self):
         mask = ball()
         first = self.nifti(mask.astype(numpy.uint8)[None], numpy.diag([0.5, 0.6, 0.7, 1]))
-        volume, record, _ = self.voxels(first, self.out, "--label", 1)
+        volume = self.voxels(first, self.out, "--label", 1)
         self.assertAlmostEqual(volume, mask.sum() * 0.21, delta=1e-4)
-        self.assertIn("the leading 1 is taken as a channel", " ".join(record["notes"]))
+        self.assertIn("the leading 1 is taken as a channel", " ".join(self.done.report["notes"]))
         self.out.unlink()
         one_hot = self.nifti(numpy.stack([~mask, mask]).astype(numpy.uint8))
         self.refuse(3, one_hot, self.out, "--label", 1, saying=["looks like 2 channels", "argmax"])
 
     def test_thick_slices_are_named(self):
-        _, record, stderr = self.voxels(self.nifti(ball().astype(numpy.uint8), numpy.diag([0.7, 0.7, 5, 1])), self.out,
-                                        "--label", 1)
-        self.assertIn("0.7 x 0.7 x 5 mm", stderr)
-        self.assertIn("half a slice, 2.5 mm", stderr)
-        self.assertEqual(len(record["warnings"]), 1)
+        self.voxels(self.nifti(ball().astype(numpy.uint8), numpy.diag([0.7, 0.7, 5, 1])), self.out, "--label", 1)
+        self.assertIn("0.7 x 0.7 x 5 mm", self.done.stderr)
+        self.assertIn("half a slice, 2.5 mm", self.done.stderr)
+        self.assertEqual(len(self.done.report["warnings"]), 1)
 
     def test_an_unnamed_unit_is_a_note(self):
         image = nibabel.Nifti1Image(ball().astype(numpy.uint8), numpy.eye(4))
         image.header.set_xyzt_units(0)
         image.to_filename(self.folder / "v.nii.gz")
-        _, record, stderr = self.voxels(self.folder / "v.nii.gz", self.out, "--label", 1)
-        self.assertIn("xyzt_units", " ".join(record["notes"]))
-        self.assertEqual(record["warnings"], [])
-        self.assertNotIn("warning", stderr)
+        self.voxels(self.folder / "v.nii.gz", self.out, "--label", 1)
+        self.assertIn("xyzt_units", " ".join(self.done.report["notes"]))
+        self.assertEqual(self.done.report["warnings"], [])
+        self.assertNotIn("warning", self.done.stderr)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,10 @@
 """tunica-extract: labels by the names that the volume or a table gives them."""
 import pathlib
-import sys
 import unittest
 
 import nibabel
 import numpy
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from test_extract import ExtractTest, ball  # noqa: E402
+from volumes import ExtractTest, ball
 
 BIDS = "index\tname\n1\taorta\n7\tleft atrium\n"
 ITK_SNAP = '# ITK-SnAP Label Description File\n1 255 0 0 1 1 1 "aorta"\n7 0 255 0 1 1 1 "left atrium"\n'
@@ -36,35 +33,31 @@ class Names(ExtractTest):
         image.to_filename(self.folder / "multi.nii.gz")
         return self.folder / "multi.nii.gz"
 
-    def voxels(self, *arguments):
-        report, stderr = self.run_tool(*arguments)
-        return report["result"]["voxel_volume_mm3"], report, stderr
-
     def test_of_totalsegmentator(self):
         volume = self.totalsegmentator({1: "aorta", 7: "left atrium"})
-        self.assertEqual(self.voxels(volume, self.out, "--label", "left atrium")[0], 27)
+        self.assertEqual(self.voxels(volume, self.out, "--label", "left atrium"), 27)
         self.assertIn(b"label 7 (left atrium)", self.out.read_bytes())
-        report, _ = self.run_tool(volume, "--info")
+        report = self.run_tool(volume, "--info")
         self.assertEqual([label["name"] for label in report["result"]["labels"]], ["aorta", "left atrium"])
-        self.assertRegex(self.stdout, r"7 +27 voxels .* left atrium\n")
+        self.assertRegex(self.done.stdout, r"7 +27 voxels .* left atrium\n")
 
     def test_of_a_table_beside_the_volume(self):
         for name, text in (("scan.tsv", BIDS), ("scan.txt", ITK_SNAP), ("scan.label", ITK_SNAP), ("scan.ctbl", SLICER)):
             table = self.folder / name
             table.write_text(text)
-            voxels, report, _ = self.voxels(self.volume, self.out, "--label", "left atrium")
+            voxels = self.voxels(self.volume, self.out, "--label", "left atrium")
             self.assertEqual(voxels, 27, name)
-            self.assertEqual([pathlib.Path(entry["path"]).name for entry in report["inputs"]], ["scan.nii.gz", name])
+            self.assertEqual([pathlib.Path(entry["path"]).name for entry in self.done.report["inputs"]], ["scan.nii.gz", name])
             self.run_tool(self.volume, "--info")
-            self.assertIn("left atrium", self.stdout)
+            self.assertIn("left atrium", self.done.stdout)
             table.unlink()
 
     def test_of_a_table_that_is_named_go_before_those_in_the_volume(self):
         (self.folder / "own.tsv").write_text("index\tname\n7\taorta\n1\tvein\n")
         volume = self.totalsegmentator({1: "aorta", 7: "left atrium"})
-        self.assertEqual(self.voxels(volume, self.out, "--label", "aorta", "--names", self.folder / "own.tsv")[0], 27)
+        self.assertEqual(self.voxels(volume, self.out, "--label", "aorta", "--names", self.folder / "own.tsv"), 27)
         (self.folder / "multi.tsv").write_text("index\tname\n7\taorta\n")
-        self.assertGreater(self.voxels(volume, self.out, "--label", "aorta")[0], 400)
+        self.assertGreater(self.voxels(volume, self.out, "--label", "aorta"), 400)
 
     def test_that_are_misspelt_get_the_nearest(self):
         (self.folder / "scan.tsv").write_text(BIDS)
@@ -74,7 +67,7 @@ class Names(ExtractTest):
     def test_that_two_labels_have_are_refused(self):
         (self.folder / "scan.tsv").write_text("index\tname\n1\taorta\n7\taorta\n")
         self.refuse(3, self.volume, self.out, "--label", "aorta", saying="'aorta' is the name of two labels, 1 and 7")
-        self.assertEqual(self.voxels(self.volume, self.out, "--label", 7)[0], 27)
+        self.assertEqual(self.voxels(self.volume, self.out, "--label", 7), 27)
 
     def test_that_nothing_gives(self):
         self.refuse(3, self.volume, self.out, "--label", "aorta", saying="nothing names its labels (--names FILE)")
@@ -85,13 +78,13 @@ class Names(ExtractTest):
 
     def test_of_another_file_beside_are_left_out_with_a_warning(self):
         (self.folder / "scan.txt").write_text("A scan of the abdomen.\n")
-        _, report, stderr = self.voxels(self.volume, self.out, "--label", 7)
-        self.assertIn("scan.txt:1: is no line of a table of labels", report["warnings"][0])
-        self.assertIn("warning", stderr)
+        self.voxels(self.volume, self.out, "--label", 7)
+        self.assertIn("scan.txt:1: is no line of a table of labels", self.done.report["warnings"][0])
+        self.assertIn("warning", self.done.stderr)
         self.out.unlink()
         self.refuse(3, self.volume, self.out, "--label", 7, "--names", self.folder / "scan.txt", saying="scan.txt:1")
         self.refuse(3, self.volume, self.out, "--label", 7, "--names", self.folder / "none.tsv", saying="none.tsv")
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + ["-v"] + sys.argv[1:])
+    unittest.main()

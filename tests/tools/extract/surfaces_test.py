@@ -1,20 +1,15 @@
 """GLB, OBJ, STL and 3MF: what is written is read again, to float accuracy."""
 import json
-import os
-import pathlib
 import struct
-import subprocess
-import tempfile
 import unittest
 import xml.etree.ElementTree
 import zipfile
 
 import h5py
 import numpy as np
+from meshes import Ply
+from running import ToolTest
 
-from volumes import Ply
-
-BIN = pathlib.Path(os.environ["TUNICA_BIN"])
 
 
 def read_glb(data):
@@ -59,18 +54,9 @@ def read_3mf(path):
     return np.array(vertices), np.array(triangles), root.get("unit"), root.find("resources/basematerials/base", space).get("name")
 
 
-class Surfaces(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="tunica-surfaces-")
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def run_tool(self, verb, *words, expect=0):
-        done = subprocess.run([BIN / f"tunica-{verb}", *map(str, words), "--report", "report.json", "--force"],
-                              cwd=self.folder, capture_output=True, text=True, timeout=120, check=False)
-        self.assertEqual(done.returncode, expect, done.stderr)
-        self.error = done.stderr
-        return json.loads((self.folder / "report.json").read_text(encoding="utf-8"))["result"]
+class Surfaces(ToolTest):
+    def run_tool(self, *words, **options):
+        return super().run_tool(*words, "--force", **options)["result"]
 
     def extracted(self):
         self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
@@ -122,8 +108,7 @@ class Surfaces(unittest.TestCase):
     def test_other_endings_are_refused(self):
         self.run_tool("phantom", "sphere", "v.nii.gz", "--size", "16", "--spacing", "1.7")
         for name in ("s.gltf", "s.3ds", "s"):
-            self.run_tool("extract", "v.nii.gz", name, "--label", "1", expect=2)
-            self.assertIn(".ply or .glb or .obj or .stl or .3mf", self.error)
+            self.run_tool("extract", "v.nii.gz", name, "--label", "1", code=2, says=".ply or .glb or .obj or .stl or .3mf")
             self.assertFalse((self.folder / name).exists())
 
     def test_names_that_are_markup(self):

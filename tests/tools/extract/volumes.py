@@ -1,97 +1,14 @@
-"""Volumes and surfaces read and written without tunica: nibabel for NIfTI, by hand for the rest."""
+"""Volumes and surfaces read and written without tunica: nibabel for NIfTI, by hand for the rest; surfaces against voxels."""
 import gzip
 import pathlib
 import zlib
 
 import nibabel
 import numpy
+from meshes import Ply
+from running import ToolTest
 
 LPS = numpy.diag([-1.0, -1.0, 1.0, 1.0])  # RAS to LPS and back
-
-
-class Ply:
-    """The binary PLY of the contract, parsed by its header: vertices (n, 3) double, triangles (m, 3) int."""
-
-    def __init__(self, path):
-        data = pathlib.Path(path).read_bytes()
-        end = data.index(b"end_header\n") + len(b"end_header\n")
-        lines = data[:end].decode().splitlines()
-        assert lines[:2] == ["ply", "format binary_little_endian 1.0"], lines[:2]
-        self.comments = [line[len("comment "):] for line in lines if line.startswith("comment ")]
-        vertices = int(next(line for line in lines if line.startswith("element vertex")).split()[2])
-        faces = int(next(line for line in lines if line.startswith("element face")).split()[2])
-        properties = [line.split()[1:] for line in lines if line.startswith("property")]
-        assert properties[:3] == [["double", "x"], ["double", "y"], ["double", "z"]], properties
-        assert properties[3][0] == "list" and properties[3][1] == "uchar" and properties[3][2] in ("int", "uint")
-        assert len(properties) == 4
-        self.vertices = numpy.frombuffer(data, "<f8", 3 * vertices, end).reshape(-1, 3)
-        faces = numpy.frombuffer(data, [("n", "u1"), ("v", "<i4", 3)], faces, end + 24 * vertices)
-        assert (faces["n"] == 3).all()
-        assert len(data) == end + 24 * vertices + 13 * len(faces)
-        self.triangles = faces["v"].astype(numpy.int64)
-
-    def edges(self):
-        t = self.triangles
-        return numpy.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-
-    def is_closed_oriented_manifold(self):
-        """Every directed edge once, and its reverse once; the triangles around each vertex are one fan."""
-        edges = self.edges()
-        n = len(self.vertices)
-        codes = edges[:, 0] * n + edges[:, 1]
-        reverse = edges[:, 1] * n + edges[:, 0]
-        unique = numpy.unique(codes)
-        if len(unique) != len(codes) or not numpy.array_equal(unique, numpy.unique(reverse)):
-            return False
-        # Corners of triangles, joined across edges, form one class per vertex.
-        corners = numpy.arange(3 * len(self.triangles))
-        at = self.triangles.reshape(-1)
-        order = numpy.argsort(codes)
-        m = len(self.triangles)
-        partner = order[numpy.searchsorted(codes[order], reverse)]
-        triangle, side = numpy.arange(3 * m) % m, numpy.arange(3 * m) // m
-        start = 3 * triangle + side
-        # Edge e runs from corner `side` to the next; its partner's end is at the same vertex.
-        other = 3 * (partner % m) + (partner // m + 1) % 3
-        assert (at[start] == at[other]).all()
-        return count_classes(3 * m, start, other) == len(numpy.unique(at)) and corners.size == 3 * m
-
-    def euler(self):
-        return len(numpy.unique(self.triangles)) - len(self.edges()) // 2 + len(self.triangles)
-
-    def components(self):
-        edges = self.edges()
-        return count_classes(len(self.vertices), edges[:, 0], edges[:, 1]) - (
-            len(self.vertices) - len(numpy.unique(self.triangles)))
-
-    def corners(self):
-        return (self.vertices[self.triangles[:, i]] for i in range(3))
-
-    def volume(self):
-        origin = self.vertices.mean(axis=0)
-        a, b, c = (corner - origin for corner in self.corners())
-        return numpy.einsum("ij,ij->", a, numpy.cross(b, c)) / 6
-
-    def smallest_area(self):
-        a, b, c = self.corners()
-        return numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1).min() / 2
-
-    def area(self):
-        a, b, c = self.corners()
-        return numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1).sum() / 2
-
-
-def count_classes(size, a, b):
-    """Connected components of a graph, by label propagation with pointer jumping."""
-    label = numpy.arange(size)
-    while True:
-        low = numpy.minimum(label[a], label[b])
-        numpy.minimum.at(label, label[a], low)
-        numpy.minimum.at(label, label[b], low)
-        while not numpy.array_equal(label, label[label]):
-            label = label[label]
-        if numpy.array_equal(label[a], label[b]):
-            return len(numpy.unique(label))
 
 
 def expected_vertices(mask):
@@ -163,3 +80,69 @@ def write_mha(path, array, affine):
               f"Offset = {words(affine[:3, 3])}\nElementSpacing = {words(spacing)}\n"
               f"DimSize = {' '.join(map(str, array.shape))}\nElementType = {kind}\nElementDataFile = LOCAL\n")
     pathlib.Path(path).write_bytes(header.encode() + packed)
+
+
+def ball(shape=(14, 15, 16), radius=5.0):
+    index = numpy.indices(shape).astype(float)
+    centre = (numpy.array(shape) - 1).reshape(3, 1, 1, 1) / 2
+    return ((index - centre) ** 2).sum(axis=0) < radius ** 2
+
+
+class ExtractTest(ToolTest):
+    verb = "extract"
+
+    def setUp(self):
+        super().setUp()
+        self.out = self.folder / "out.ply"
+
+    def run_tool(self, *words, force=True, **options):
+        report = super().run_tool(*words, *(["--force"] if force else []), **options)
+        self.assertEqual(list(self.folder.glob("*.part")), [])
+        return report
+
+    def voxels(self, *words):
+        """@return the volume of the voxels taken"""
+        return self.run_tool(*words)["result"]["voxel_volume_mm3"]
+
+    def refuse(self, code, *arguments, saying):
+        self.run_tool(*arguments, code=code, says=saying)
+        self.assertFalse(self.out.exists())
+
+    def nifti(self, array, affine=None, name="v.nii.gz"):
+        path = self.folder / name
+        nibabel.save(nibabel.Nifti1Image(array, numpy.eye(4) if affine is None else affine), path)
+        return path
+
+    def check_surface(self, ply, result, mask, affine, tag=""):
+        """A written surface against the mask it came from: exact vertices, closed, oriented outward, the report true."""
+        self.assertEqual(ply.fields.dtype.names, ("x", "y", "z"), tag)
+        self.assertTrue(ply.is_closed_oriented_manifold(), tag)
+        index = (numpy.linalg.inv(affine) @ numpy.c_[ply.vertices, numpy.ones(len(ply.vertices))].T).T[:, :3]
+        doubled = numpy.round(2 * index)
+        self.assertLess(numpy.abs(2 * index - doubled).max(), 1e-3, tag)
+        self.assertTrue(numpy.array_equal(numpy.unique(doubled.astype(int), axis=0), expected_vertices(mask)), tag)
+        world = (affine @ numpy.c_[expected_vertices(mask) / 2, numpy.ones(len(expected_vertices(mask)))].T).T[:, :3]
+        scale = numpy.abs(world).max()
+        self.assertLess(numpy.abs(ply.vertices.min(axis=0) - world.min(axis=0)).max(), 1e-6 * scale, tag)
+        self.assertLess(numpy.abs(ply.vertices.max(axis=0) - world.max(axis=0)).max(), 1e-6 * scale, tag)
+        self.assertGreater(ply.smallest_area(), 0, tag)
+        voxel = abs(numpy.linalg.det(affine[:3, :3]))
+        self.assertAlmostEqual(result["voxel_volume_mm3"], mask.sum() * voxel, delta=1e-6 * mask.sum() * voxel)
+        self.assertEqual(result["vertices"], len(ply.vertices))
+        self.assertEqual(result["triangles"], len(ply.triangles))
+        self.assertEqual(result["euler"], ply.euler(), tag)
+        self.assertEqual(result["components"], ply.components(), tag)
+        self.assertIs(result["closed"], True)
+        self.assertIs(result["manifold"], True)
+        self.assertIs(result["oriented_outward"], True)
+        self.assertGreater(ply.volume(), 0, tag)
+        self.assertAlmostEqual(result["volume_mm3"], ply.volume(), delta=1e-6 * ply.volume())
+        self.assertAlmostEqual(result["area_mm2"], ply.area(), delta=1e-6 * ply.area())
+        box = ply.vertices.max(axis=0) - ply.vertices.min(axis=0)
+        self.assertAlmostEqual(result["diagonal_mm"], numpy.linalg.norm(box), delta=1e-6)
+
+    def extract_and_check(self, path, mask, affine, *arguments, tag=""):
+        record = self.run_tool(path, self.out, *arguments)
+        ply = Ply(self.out)
+        self.check_surface(ply, record["result"], mask, affine, tag)
+        return ply, record

@@ -1,13 +1,10 @@
 """tunica-extract: labels that are walls, cavities, cuts through a side, several labels as one, organs that touch."""
 import pathlib
-import sys
 import unittest
 
 import numpy
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-from test_extract import ExtractTest  # noqa: E402
-from volumes import Ply  # noqa: E402
+from meshes import Ply
+from volumes import ExtractTest
 
 MM = numpy.diag([0.8, 0.8, 0.8, 1])  # RAS: x and y are turned round in LPS
 
@@ -18,21 +15,15 @@ def grid(shape=(40, 40, 48)):
 
 def rims(ply):
     """The planes z in which boundary edges lie, and whether all lie in such."""
-    edges = {}
-    for a, b in ply.edges():
-        edges[(min(a, b), max(a, b))] = edges.get((min(a, b), max(a, b)), 0) + 1
-    boundary = numpy.array([edge for edge, uses in edges.items() if uses == 1])
-    if not len(boundary):
-        return set()
-    z = ply.vertices[boundary][:, :, 2]
-    assert numpy.abs(z[:, 0] - z[:, 1]).max() < 1e-9
+    z = ply.vertices[ply.rim(), 2]
+    assert numpy.abs(z[:, 0] - z[:, 1]).max(initial=0) < 1e-9
     return set(numpy.round(z[:, 0], 4))
 
 
 class Warnings(ExtractTest):
     def warned(self, *arguments, of=None, saying=()):
         """@return the report, whose only warning of weight is of this kind and says that"""
-        report, _ = self.run_tool(*arguments)
+        report = self.run_tool(*arguments)
         self.assertEqual(report["warning_kinds"], [of] if of else [], report["warnings"])
         for text in saying:
             self.assertIn(text, report["warnings"][0])
@@ -53,7 +44,7 @@ class Walls(Warnings):
         for outer in (14.0, 13.2):
             volume = self.tube(outer)
             for flags in ([], ["--open-border"], ["--open-border", "--smooth", "staircase", "--largest"]):
-                report, _ = self.run_tool(volume, self.out, "--label", 1, *flags)
+                report = self.run_tool(volume, self.out, "--label", 1, *flags)
                 self.assertEqual(report["warning_kinds"][0], "wall with two faces", flags)
                 self.assertIn("(-15.6, -15.6, 18.8) mm", report["warnings"][0])
                 self.assertIn("--face inner", report["warnings"][0])
@@ -92,7 +83,7 @@ class Walls(Warnings):
         volume = self.nifti((3 - numpy.abs(r - 12)).astype(numpy.float32))
         for flags in ([], ["--slab", 7], ["--smooth", "1mm"]):
             for face, radius in (("inner", 10), ("outer", 14)):
-                report, _ = self.run_tool(volume, self.out, "--isovalue", 1, "--face", face, *flags)
+                report = self.run_tool(volume, self.out, "--isovalue", 1, "--face", face, *flags)
                 ply = Ply(self.out)
                 self.assertTrue(ply.is_closed_oriented_manifold(), (flags, face))
                 self.assertAlmostEqual(ply.volume(), 4 / 3 * numpy.pi * radius ** 3, delta=0.08 * ply.volume())
@@ -121,14 +112,14 @@ class Walls(Warnings):
         for slit in (1, 3, 10):
             volume = self.nifti((tube & ~((numpy.abs(j - 19.5) < slit) & (i > 19))).astype(numpy.uint8))
             for flags in ([], ["--largest", "--open-border", "--smooth", "staircase"]):
-                report, _ = self.run_tool(volume, self.out, "--label", 1, *flags)
+                report = self.run_tool(volume, self.out, "--label", 1, *flags)
                 self.assertEqual(report["warning_kinds"][0], "wall with two faces", (slit, flags))
                 self.assertIn("may be a wall with two faces that is open along a slit", report["warnings"][0])
             self.out.unlink()
             self.refuse(3, volume, self.out, "--label", 1, "--face", "inner", saying=["no wall around a hollow", "slit"])
         self.warned(self.nifti(tube.astype(numpy.uint8)), self.out, "--label", 1, "--open-border", "--face", "inner")
 
-    def test_flags(self):
+    def test_wrong_usage_is_2(self):
         volume = self.tube()
         for flags, saying in ((["--all-labels", "--face", "inner"], "--face is of one wall"),
                               (["--label", 1, "--other-face", "o.ply"], "needs --face"),
@@ -143,7 +134,7 @@ class Walls(Warnings):
         r = numpy.hypot(i, j - 19.5)
         volume = self.nifti(((r < 14) & (r >= 12)).astype(numpy.uint8), MM)
         for border in ([], ["--open-border"]):
-            report, _ = self.run_tool(volume, self.out, "--label", 1, "--face", "inner", "--smooth", "staircase", *border)
+            report = self.run_tool(volume, self.out, "--label", 1, "--face", "inner", "--smooth", "staircase", *border)
             thickness = report["result"]["wall_thickness_mm"]
             self.assertAlmostEqual(thickness["mean"], 1.6, delta=0.1)
             self.assertGreater(thickness["p5"], 1)
@@ -180,7 +171,7 @@ class Sides(Warnings):
     def test_of_sheets_across_the_image_are_bent_rims(self):
         i, j, k = grid()
         volume = self.nifti((numpy.abs(k - 24 - 0.02 * ((i - 19) ** 2 + (j - 19) ** 2)) < 2).astype(numpy.uint8), MM)
-        report, _ = self.run_tool(volume, self.out, "--label", 1, "--open-border")
+        report = self.run_tool(volume, self.out, "--label", 1, "--open-border")
         self.assertTrue({"bent rim", "side cut"} & set(report["warning_kinds"]), report["warnings"])
 
 
@@ -205,9 +196,9 @@ class Unions(Warnings):
         self.assertTrue((self.folder / "1+2.ply").exists())
 
     def test_of_names_that_hold_a_plus(self):
-        report, _ = self.run_tool(self.volume, self.out, "--label", "lumen+wall")
+        report = self.run_tool(self.volume, self.out, "--label", "lumen+wall")
         self.assertEqual(report["result"]["voxel_volume_mm3"], 8)
-        report, _ = self.run_tool(self.volume, self.out, "--label", "thrombus+lumen+wall")
+        report = self.run_tool(self.volume, self.out, "--label", "thrombus+lumen+wall")
         self.assertEqual(report["result"]["voxel_volume_mm3"], 8 + (self.organ == 2).sum())
 
     def test_name_the_part_that_is_not_there(self):
@@ -237,10 +228,10 @@ class Openings(Warnings):
         report = self.warned(self.nifti(organ.astype(numpy.uint8)), self.out, "--label", 1, "--open-border",
                              of="narrow opening", saying=["2 of its 2", "(-14.0, -14.0, -0.5) mm, (-14.0, -14.0, 29.5) mm"])
         self.assertFalse(report["result"]["closed"])
-        report, _ = self.run_tool(self.nifti(organ.astype(numpy.uint8)), self.out, "--label", 1, "--open-border", "--space",
+        report = self.run_tool(self.nifti(organ.astype(numpy.uint8)), self.out, "--label", 1, "--open-border", "--space",
                                   "ras")
         self.assertIn("(14.0, 14.0, -0.5) mm", report["warnings"][0])
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + ["-v"] + sys.argv[1:])
+    unittest.main()

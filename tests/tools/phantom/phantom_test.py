@@ -1,37 +1,19 @@
 """tunica-phantom as its users run it: files read by other programs, samples made again, errors with their codes."""
 import gzip
-import json
 import os
-import shutil
-import subprocess
-import tempfile
 import unittest
 
 import nibabel
 import numpy
 import vtk
+from running import SOURCE, ToolTest
 from vtk.util.numpy_support import vtk_to_numpy
 
-TOOL = os.path.join(os.environ["TUNICA_BIN"], "tunica-phantom")
-SAMPLES = os.path.join(os.environ["TUNICA_SOURCE"], "data-samples")
+SAMPLES = SOURCE / "data-samples"
 
 
-class Phantom(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.mkdtemp()
-        self.addCleanup(shutil.rmtree, self.folder)
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def run_tool(self, *arguments, code=0):
-        run = subprocess.run([TOOL, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True)
-        self.assertEqual(run.returncode, code, run.stderr)
-        return run
-
-    def report(self):
-        with open(self.path("report.json")) as file:
-            return json.load(file)
+class Phantom(ToolTest):
+    verb = "phantom"
 
     def test_samples_are_what_their_readme_says(self):
         with open(os.path.join(SAMPLES, "README.md")) as file:
@@ -53,9 +35,8 @@ class Phantom(unittest.TestCase):
     def test_truth_encloses_the_voxels_that_other_programs_read(self):
         for shape, spacing in [("sphere", (1, 1, 1)), ("bladder", (0.8, 0.8, 2.5)), ("aneurysm", (0.5, 0.5, 0.5))]:
             text = ",".join(map(str, spacing))
-            self.run_tool(shape, "v.nii.gz", "--size", 56, "--spacing", text, "--truth", "t.ply",
-                          "--report", "report.json", "--force", "--quiet")
-            result = self.report()["result"]
+            result = self.run_tool(shape, "v.nii.gz", "--size", 56, "--spacing", text, "--truth", "t.ply", "--force",
+                                   "--quiet")["result"]
             image = nibabel.load(self.path("v.nii.gz"))
             voxels = numpy.asarray(image.dataobj)
             self.assertEqual(max(voxels.shape), 56)
@@ -117,12 +98,10 @@ class Phantom(unittest.TestCase):
                                 (["sphere", "a.nii.gz", "--noise", "2"], "0 to 1"),
                                 (["sphere", "a.nii.gz", "--sise", "20"], "sise"),
                                 (["sphere"], "OUT")]:
-            run = self.run_tool(*arguments, code=2)
-            self.assertIn(word, run.stderr)
-            self.assertTrue(run.stderr.startswith("tunica-phantom: "), run.stderr)
+            self.run_tool(*arguments, code=2, says=word)
             self.assertEqual(os.listdir(self.folder), [])
         self.run_tool("sphere", "a.nii.gz", "--size", 16, "--quiet")
-        self.assertIn("--force", self.run_tool("sphere", "a.nii.gz", "--size", 16, code=5).stderr)
+        self.run_tool("sphere", "a.nii.gz", "--size", 16, code=5, says="--force")
         self.run_tool("sphere", "no/such/folder/a.nii.gz", code=5)
 
 

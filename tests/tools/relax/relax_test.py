@@ -1,39 +1,25 @@
 #!/usr/bin/python3
 """tunica-relax from outside: the contract's keys and exit codes, the patch in the file, the paper's own targets."""
-import json
+import functools
 import os
 import re
 import signal
-import subprocess
-import tempfile
 import unittest
 
 import numpy as np
 
 import meshes
-from curved_patch import columns, normals_across, patch_points, read_corner_normals, read_ply, watertight_points
+from curved_patch import normals_across, patch_points, watertight_points
+from meshes import Ply
+from running import SHARED, ToolTest
 
-BIN = os.environ["TUNICA_BIN"]
-PAPER = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "paper")
-MESHES = os.path.join(os.environ.get("TUNICA_SHARED_DATA", ""), "meshes")
-
-
-def write_ply(path, vertices, triangles, space="LPS"):
-    meshes.write_ply(path, vertices, triangles, comments=["units mm", f"SPACE={space}"])
+PAPER, MESHES = SHARED / "paper", SHARED / "meshes"
+write_ply = functools.partial(meshes.write_ply, comments=["units mm", "SPACE=LPS"])
+RAS = {"comments": ["units mm", "SPACE=RAS"]}
 
 
 def cylinder(around, along, radius=10.0, length=30.0):
-    """An open cylinder, odd rows shifted by half a cell."""
-    rows, columns_ = np.meshgrid(np.arange(along + 1), np.arange(around), indexing="ij")
-    angle = 2 * np.pi * (columns_ + 0.5 * (rows % 2)) / around
-    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), length * rows / along], -1).reshape(-1, 3)
-    triangles = []
-    for j in range(along):
-        for i in range(around):
-            a, b = j * around + i, j * around + (i + 1) % around
-            c, d = a + around, b + around
-            triangles += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
-    return vertices, np.array(triangles)
+    return meshes.tube(around, along, radius, length, shifted=True)
 
 
 def closed_cylinder(around, radius=10.0, length=30.0):
@@ -58,33 +44,13 @@ def sphere(splits, radius=20.0):
     return meshes.geodesic_sphere(splits, radius)[:2]
 
 
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-
-    def path(self, name):
-        return os.path.join(self.folder.name, name)
-
+class Case(ToolTest):
     method = []  # the default
 
-    def relax(self, *arguments, expect=0):
+    def relax(self, *arguments, **options):
         """Runs the tool, with the class's method when none is named; @return its report and stderr."""
-        arguments = [*arguments, *([] if "--method" in arguments else self.method)]
-        report = self.path("report.json")
-        if os.path.exists(report):
-            os.remove(report)
-        run = subprocess.run([os.path.join(BIN, "tunica-relax"), *map(str, arguments), "--report", report],
-                             capture_output=True, text=True, timeout=500)
-        self.assertEqual(run.returncode, expect, run.stderr)
-        if not os.path.exists(report):
-            return None, run.stderr
-        with open(report) as file:
-            record = json.load(file)
-        self.assertEqual(record["ok"], expect == 0)
-        if expect:
-            self.assertEqual(run.stderr.strip().splitlines()[-1].count("tunica-relax: "), 1)
-        return record, run.stderr
+        self.run_tool("relax", *arguments, *([] if "--method" in arguments else self.method), **options)
+        return self.done.report, self.done.stderr
 
 
 class Contract(Case):
@@ -96,8 +62,8 @@ class Contract(Case):
 
     def test_shells_that_are_none_of_the_surface_are_told(self):
         write_ply(self.path("one.ply"), np.array([[10.0, 0, 20], [9, 4, 20], [9, 0, 24]]), [(0, 1, 2)])
-        _, error = self.relax(self.path("one.ply"), self.target, self.out)
-        self.assertIn("of the surface's diagonal apart: are COARSE and TARGET of one organ", error)
+        self.relax(self.path("one.ply"), self.target, self.out,
+                   says="of the surface's diagonal apart: are COARSE and TARGET of one organ")
 
     def test_a_pole_given_as_a_ring_of_vertices_is_no_boundary(self):
         vertices, triangles = cylinder(24, 12)
@@ -108,8 +74,7 @@ class Contract(Case):
         vertices = np.column_stack([vertices[:, :2] * across[:, None], -10 * np.cos(turn)])
         write_ply(self.target, vertices, triangles)
         coarse = self.path("closed.ply")
-        subprocess.run([os.path.join(BIN, "tunica-decimate"), self.target, coarse, "--triangles", "60"], check=True,
-                       capture_output=True)
+        self.run_tool("decimate", self.target, coarse, "--triangles", 60)
         for start in (coarse, self.target):
             record, said = self.relax(start, self.target, self.out, "--tolerance", "3%", "--max-iterations", 1, "--force")
             self.assertIsNone(record["result"]["boundary_percent"])
@@ -126,7 +91,8 @@ class Contract(Case):
                     "boundary_percent", "flat_hausdorff_percent", "iterations", "min_angle_deg", "self_intersections",
                     "reached"):
             self.assertIn(key, result)
-        self.assertIn(result["shells"], range(46, 49))
+        self.assertLessEqual(result["shells"], 48)
+        self.assertGreaterEqual(result["shells"], 0.9 * 48)
         self.assertIsNone(result["reached"])
         self.assertEqual(result["self_intersections"], 0)
         diagonal = np.linalg.norm([20, 20, 30])
@@ -144,16 +110,13 @@ class Contract(Case):
         self.assertLess(result["hausdorff_percent"]["upper"], result["flat_hausdorff_percent"]["lower"] / 2)
         self.assertLessEqual(result["hausdorff_percent"]["lower"],
                              min(i["hausdorff_percent"]["upper"] for i in result["iterations"]))
-        vertices, _, comments = read_ply(self.path("map.ply"))
-        self.assertIn("quality", vertices.dtype.names)
-        self.assertLessEqual(vertices["quality"].max(), result["hausdorff_mm"]["upper"])
+        self.assertLessEqual(Ply(self.path("map.ply")).fields["quality"].max(), result["hausdorff_mm"]["upper"])
         with open(self.path("map.png"), "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
-        vertices, _, comments = read_ply(self.out)
+        shell = Ply(self.out)
         for comment in ("surface=watertight", "units mm", "SPACE=LPS"):
-            self.assertIn(comment, comments)
-        normals = columns(vertices, ("nx", "ny", "nz"))
-        self.assertLess(np.abs(np.linalg.norm(normals, axis=1) - 1).max(), 1e-12)
+            self.assertIn(comment, shell.comments)
+        self.assertLess(np.abs(np.linalg.norm(shell.normals(), axis=1) - 1).max(), 1e-12)
 
     def test_refine_reaches_the_tolerance_and_two_threads_give_the_same_bytes(self):
         record, _ = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.1%", "--refine", "--threads", 1)
@@ -161,22 +124,21 @@ class Contract(Case):
         self.assertLessEqual(record["result"]["hausdorff_percent"]["upper"], 0.1)
         other = self.path("other.ply")
         self.relax(self.coarse, self.target, other, "--tolerance", "0.1%", "--refine", "--threads", 2)
-        first, second = read_ply(self.out), read_ply(other)
-        self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
+        first, second = Ply(self.out), Ply(other)
+        self.assertTrue((first.fields == second.fields).all() and (first.faces == second.faces).all())
 
     def test_watertight_patches_are_those_of_the_file_and_meet(self):
         curved = self.path("curved.ply")
         for method in (("barycentre",), ("fit", "--max-iterations", "1"), ("fit", "--refine", "--tolerance", "2%")):
             record, _ = self.relax(self.coarse, self.target, self.out, "--surface", "watertight", "--method", *method,
                                    "--curved", curved, "--force")
-            vertices, triangles, comments = read_ply(self.out)
-            self.assertIn("surface=watertight", comments)
-            if "corner_normals" in open(self.out, "rb").read().decode("latin-1"):
+            shell = Ply(self.out)
+            self.assertIn("surface=watertight", shell.comments)
+            if "corner_normals" in shell.faces.dtype.names:
                 continue
-            points, normals = columns(vertices, "xyz"), columns(vertices, ("nx", "ny", "nz"))
+            points, normals, triangles = shell.vertices, shell.normals(), shell.triangles
             grid = np.array([(4 - i - j, i, j) for i in range(5) for j in range(5 - i)]) / 4
-            fine_vertices, fine_triangles, _ = read_ply(curved)
-            fine = columns(fine_vertices, "xyz")
+            fine, fine_triangles = Ply(curved).vertices, Ply(curved).triangles
             expected = np.concatenate([watertight_points(points[t], normals[t], grid) for t in triangles])
             some = expected[::31]
             distances = np.array([np.linalg.norm(fine - p, axis=1).min() for p in some])
@@ -187,11 +149,7 @@ class Contract(Case):
             rounded = {tuple(p) for p in np.round(expected.reshape(len(triangles), -1, 3)[:, on_edges], 9).reshape(-1, 3)}
             edges = {tuple(sorted(e)) for t in triangles for e in ((t[0], t[1]), (t[1], t[2]), (t[2], t[0]))}
             self.assertEqual(len(rounded), len(points) + 3 * len(edges))
-            compare = subprocess.run([os.path.join(BIN, "tunica-compare"), self.out, self.target, "--shell",
-                                      "--report", self.path("compare.json"), "--force"], capture_output=True, text=True)
-            self.assertEqual(compare.returncode, 0, compare.stderr)
-            with open(self.path("compare.json")) as file:
-                again = json.load(file)["result"]["hausdorff_percent"]
+            again = self.run_tool("compare", self.out, self.target, "--shell")["result"]["hausdorff_percent"]
             self.assertLessEqual(again["lower"], record["result"]["hausdorff_percent"]["upper"])
             self.assertGreaterEqual(again["upper"], record["result"]["hausdorff_percent"]["lower"])
 
@@ -200,9 +158,9 @@ class Contract(Case):
         vertices, triangles = closed_cylinder(96)
         write_ply(target, vertices, triangles)
         record, _ = self.relax(target, target, self.out, "--surface", "watertight", "--tolerance", "0.3%")
-        points, triangles, comments = read_ply(self.out)
-        points, normals = columns(points, "xyz"), read_corner_normals(self.out)
-        self.assertIn("surface=watertight", comments)
+        shell = Ply(self.out)
+        points, triangles, normals = shell.vertices, shell.triangles, shell.corner_normals()
+        self.assertIn("surface=watertight", shell.comments)
         self.assertLess(np.sum(normals[:, 0] * normals[:, 1], axis=1).min(), 1 - 1e-6)
         across = normals_across(triangles, normals)
         self.assertGreater((np.linalg.norm(across - normals[:, :, None], axis=3) > 0.5).sum(), 20)
@@ -219,43 +177,36 @@ class Contract(Case):
         self.assertLessEqual(np.minimum(beside, beyond).max(), upper)
         smooth = np.array([watertight_points(points[t], normals[i], grid) for i, t in enumerate(triangles)])
         self.assertGreater(np.abs(smooth - patches).max(), 0.01)  # creases that do something
-        for command in (["tunica-compare", self.out, target, "--shell", "--max", "0.3%"],
-                        ["tunica-simulate", self.out, self.path("closed.hdf"), "--static", "--pressure", "1kPa", "--young",
-                         "1MPa", "--poisson", "0.45", "--thickness", "1mm", "--density", "1100kg/m3", "--fix",
-                         "rigid-motions"]):
-            report = self.path(command[0] + ".json")
-            run = subprocess.run([os.path.join(BIN, command[0]), *command[1:], "--report", report], capture_output=True,
-                                 text=True)
-            self.assertEqual(run.returncode, 0, run.stderr)
-        with open(report) as file:
-            self.assertAlmostEqual(json.load(file)["result"]["volume_before_mm3"] / (np.pi * 3000), 1, delta=0.01)
+        self.run_tool("compare", self.out, target, "--shell", "--max", "0.3%")
+        solved = self.run_tool("simulate", self.out, "closed.hdf", "--static", "--pressure", "1kPa", "--young", "1MPa",
+                               "--poisson", "0.45", "--thickness", "1mm", "--density", "1100kg/m3", "--fix", "rigid-motions")
+        self.assertAlmostEqual(solved["result"]["volume_before_mm3"] / (np.pi * 3000), 1, delta=0.01)
 
     def test_tolerance_out_of_reach_is_4_and_the_best_mesh_stays(self):
         record, error = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.01%", "--max-iterations", 1,
-                                   "--method", "barycentre", expect=4)
+                                   "--method", "barycentre", code=4)
         self.assertIn("not reached", error)
         self.assertFalse(os.path.exists(self.out))
-        vertices, triangles, _ = read_ply(self.out + ".part")
-        self.assertEqual(len(triangles), 48)
+        self.assertEqual(len(Ply(self.out + ".part").triangles), 48)
         self.assertIs(record["result"]["reached"], False)
         self.assertEqual(record["result"]["shells"], 48)
 
     def test_limit_of_shells_is_kept_and_makes_4(self):
         record, _ = self.relax(self.coarse, self.target, self.out, "--tolerance", "0.01%", "--refine", "--max-shells",
-                               100, expect=4)
+                               100, code=4)
         self.assertLessEqual(record["result"]["shells"], 100)
 
     def test_wrong_usage_is_2(self):
         for extra in (["--tolerance", "0.5"], ["--tolerance", "-1mm"], ["--method", "nonsense"],
                       ["--surface", "smooth"], ["--max-shells", "10"], ["--kink", "20"], ["--effort", "1"],
                       ["--max-iterations", "0"], ["--mesh-unit", "parsec"], ["--unknown"]):
-            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
+            self.relax(self.coarse, self.target, self.out, *extra, code=2)
         for extra in (["--min-angle", "0.5"], ["--min-angle", "31"], ["--min-angle", "nan"], ["--min-angle", "wide"], ["--min-angle", "20", "--method", "barycentre"]):
-            self.relax(self.coarse, self.target, self.out, *extra, expect=2)
+            self.relax(self.coarse, self.target, self.out, *extra, code=2)
         barycentre = ["--method", "barycentre"]
         for extra in (["--refine"], ["--max-shells", "10"], ["--shells", "100"]):
-            self.relax(self.coarse, self.target, self.out, *barycentre, *extra, expect=2)
-        self.relax(self.coarse, self.target, expect=2)
+            self.relax(self.coarse, self.target, self.out, *barycentre, *extra, code=2)
+        self.relax(self.coarse, self.target, code=2)
 
     def test_a_format_without_a_unit_needs_one(self):
         vertices, triangles = cylinder(8, 3, radius=1.03, length=3.0)
@@ -263,7 +214,7 @@ class Contract(Case):
         with open(obj, "w") as file:
             file.writelines(f"v {x} {y} {z}\n" for x, y, z in vertices)
             file.writelines(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles)
-        self.assertIn("--mesh-unit", self.relax(obj, self.target, self.out, expect=2)[1])
+        self.assertIn("--mesh-unit", self.relax(obj, self.target, self.out, code=2)[1])
         record, _ = self.relax(obj, self.target, self.out, "--mesh-unit", "cm", "--max-iterations", 1)
         self.assertLess(record["result"]["hausdorff_percent"]["upper"], 1)
 
@@ -273,19 +224,19 @@ class Contract(Case):
         fan = np.vstack([triangles, [[0, 1, 30]]])  # a third triangle on an edge
         write_ply(bad, vertices, fan)
         for arguments in ((bad, self.target), (self.coarse, bad)):
-            record, error = self.relax(*arguments, self.out, expect=3)
+            record, error = self.relax(*arguments, self.out, code=3)
             self.assertIn("bad.ply", error)
             self.assertIn("near (", error)
             self.assertIn("tunica-decimate --repair", error)
-        self.relax(self.path("absent.ply"), self.target, self.out, expect=3)
+        self.relax(self.path("absent.ply"), self.target, self.out, code=3)
         with open(self.target, "rb") as file:
             whole = file.read()
         with open(bad, "wb") as file:
             file.write(whole[:len(whole) // 2])
-        self.relax(self.coarse, bad, self.out, expect=3)
+        self.relax(self.coarse, bad, self.out, code=3)
         flat = self.path("point.ply")
         write_ply(flat, np.zeros((3, 3)), [[0, 1, 2]])
-        self.relax(self.coarse, flat, self.out, expect=3)
+        self.relax(self.coarse, flat, self.out, code=3)
 
     def test_a_wrong_unit_or_place_is_told_before_any_work(self):
         vertices, triangles = cylinder(8, 3, radius=10.3)
@@ -295,23 +246,23 @@ class Contract(Case):
                             (10 * vertices, "probably cm, not mm"), (vertices + [40_000, 0, 0], "away from"),
                             (vertices + [2.5 * size, 0, 0], "away from")):
             write_ply(wrong, moved, triangles)
-            record, error = self.relax(wrong, self.target, self.out, expect=3)
+            record, error = self.relax(wrong, self.target, self.out, code=3)
             self.assertIn("wrong.ply: ", error)
             self.assertIn(says, error)
             self.assertIsNone(record["seconds"]["relax"])
             self.assertFalse(os.path.exists(self.out))
 
     def test_the_space_is_kept_and_two_spaces_are_refused(self):
-        write_ply(self.target, *cylinder(48, 30), space="RAS")
-        _, error = self.relax(self.coarse, self.target, self.out, expect=3)
+        write_ply(self.target, *cylinder(48, 30), **RAS)
+        _, error = self.relax(self.coarse, self.target, self.out, code=3)
         for part in ("coarse.ply", "SPACE=LPS", "target.ply", "SPACE=RAS"):
             self.assertIn(part, error)
-        write_ply(self.coarse, *cylinder(8, 3, radius=10.3), space="RAS")
+        write_ply(self.coarse, *cylinder(8, 3, radius=10.3), **RAS)
         others = [self.path(name) for name in ("map.ply", "curved.ply")]
         self.relax(self.coarse, self.target, self.out, "--method", "barycentre", "--max-iterations", 1, "--map", others[0],
                    "--curved", others[1])
         for written in (self.out, *others):
-            comments = read_ply(written)[2]
+            comments = Ply(written).comments
             self.assertIn("SPACE=RAS", comments)
             self.assertNotIn("SPACE=LPS", comments)
 
@@ -331,15 +282,14 @@ class Contract(Case):
                                                    "--max-iterations", 1, "--force")
                         given = kinds if coarse == "outward.ply" else kinds[:1]
                         self.assertEqual([k for k in record["warning_kinds"] if "faces" in k], given, error)
-                        made.append(self.flux(*read_ply(self.out)[:2]))
+                        made.append(self.flux(Ply(self.out)))
             self.assertEqual(set(made), {made[0]})
 
     @staticmethod
-    def flux(points, triangles):
+    def flux(ply):
         """Which way the facets face, in the mean, along the way from the middle."""
-        places = columns(points, ("x", "y", "z"))
-        a, b, c = (places[triangles[:, k]] for k in range(3))
-        middle = places.mean(0)
+        a, b, c = ply.corners()
+        middle = ply.vertices.mean(0)
         return np.sign(np.einsum("ij,ij->", np.cross(b - a, c - a), (a + b + c) / 3 - middle))
 
     def test_half_a_ball_has_no_inside(self):
@@ -350,7 +300,7 @@ class Contract(Case):
             record, error = self.relax(self.path(name), self.path(name), self.out, "--shells", 100,
                                        "--max-iterations", 1, "--force")
             self.assertNotIn("inward", error)
-            self.assertEqual(self.flux(*read_ply(self.out)[:2]), 1 if name == "half.ply" else -1)
+            self.assertEqual(self.flux(Ply(self.out)), 1 if name == "half.ply" else -1)
 
     def test_open_seams_are_said(self):
         ball, faces = sphere(3)
@@ -368,19 +318,19 @@ class Contract(Case):
             with open(self.path(name), "wb") as file:
                 file.write(content.replace(b"comment units mm", b"comment units mm\ncomment voxel 0.5 0.5 2 mm", 1))
             self.relax(self.coarse, self.target, self.out, "--method", "barycentre", "--max-iterations", 1, "--force")
-            self.assertIn("voxel 0.5 0.5 2 mm", read_ply(self.out)[2])
+            self.assertIn("voxel 0.5 0.5 2 mm", Ply(self.out).comments)
 
     def test_existing_output_is_5_unless_forced(self):
         with open(self.out, "w") as file:
             file.write("kept")
-        self.relax(self.coarse, self.target, self.out, expect=5)
+        self.relax(self.coarse, self.target, self.out, code=5)
         with open(self.out) as file:
             self.assertEqual(file.read(), "kept")
         self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--force")
-        self.relax(self.coarse, self.target, self.path("no/such/folder.ply"), expect=5)
+        self.relax(self.coarse, self.target, self.path("no/such/folder.ply"), code=5)
 
     def test_picture_range_belongs_to_a_picture(self):
-        self.relax(self.coarse, self.target, self.out, "--picture-range", "1%", expect=2)
+        self.relax(self.coarse, self.target, self.out, "--picture-range", "1%", code=2)
         picture = self.path("map.png")
         self.relax(self.coarse, self.target, self.out, "--method", "barycentre", "--max-iterations", 1, "--picture", picture,
                    "--picture-range", "1%")
@@ -391,20 +341,19 @@ class Contract(Case):
         names = [self.path(name) for name in ("curved.ply", "map.ply", "picture.png")]
         os.mkdir(names[2] + ".part")  # nothing can be written there
         self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, "--curved", names[0], "--map", names[1],
-                   "--picture", names[2], expect=5)
+                   "--picture", names[2], code=5)
         for name in (self.out, *names):
             self.assertFalse(os.path.exists(name), name)
 
     def test_a_mismatch_of_boundaries_is_said(self):
         write_ply(self.coarse, *sphere(1, 12))
-        _, error = self.relax(self.coarse, self.target, self.out, "--max-iterations", 1)
-        self.assertIn("boundary loop", error)
+        self.relax(self.coarse, self.target, self.out, "--max-iterations", 1, says="boundary loop")
 
     def test_an_interrupt_leaves_the_best_mesh(self):
         write_ply(self.target, *sphere(4))
         write_ply(self.coarse, *sphere(0))
-        run = subprocess.Popen([os.path.join(BIN, "tunica-relax"), self.coarse, self.target, self.out, "--tolerance",
-                                "0.00001%", "--refine", "--method", "barycentre", "--verbose"], stderr=subprocess.PIPE, text=True)
+        run = self.start_tool("relax", self.coarse, self.target, self.out, "--tolerance", "0.00001%", "--refine", "--method",
+                              "barycentre", "--verbose")
         lines = []
         while sum("shells:" in line for line in lines) < 2:
             lines.append(run.stderr.readline())
@@ -412,9 +361,8 @@ class Contract(Case):
         run.send_signal(signal.SIGINT)
         self.assertRegex(run.stderr.read(), r"the best mesh so far, \d+ shells, is in .*\.part")
         self.assertEqual(run.wait(60), 130)
-        run.stderr.close()
         self.assertFalse(os.path.exists(self.out))
-        self.assertGreaterEqual(len(read_ply(self.out + ".part")[1]), 20)
+        self.assertGreaterEqual(len(Ply(self.out + ".part").triangles), 20)
 
 
 class Fit(Case):
@@ -431,18 +379,14 @@ class Fit(Case):
         self.assertTrue(result["reached"])
         self.assertLessEqual(result["hausdorff_percent"]["upper"], 0.3)
         self.assertLess(result["shells"], 60)
-        self.assertEqual(len(read_ply(self.out)[1]), result["shells"])
+        self.assertEqual(len(Ply(self.out).triangles), result["shells"])
         self.assertEqual(result["self_intersections"], 0)
         self.assertGreater(len(result["iterations"]), 0)
         # Both ends, as curves, and as whoever measures the file finds them.
         boundary = result["boundary_percent"]
         self.assertLessEqual(boundary["upper"], 0.3)
         self.assertLessEqual(boundary["lower"], boundary["upper"])
-        report = self.path("compare.json")
-        subprocess.run([os.path.join(BIN, "tunica-compare"), "--shell", self.out, self.target, "--report", report],
-                       check=True, capture_output=True, timeout=300)
-        with open(report) as file:
-            measured = json.load(file)["result"]["boundary_percent"]
+        measured = self.run_tool("compare", "--shell", self.out, self.target)["result"]["boundary_percent"]
         self.assertLessEqual(measured["lower"], boundary["upper"])
         self.assertGreaterEqual(measured["upper"], boundary["lower"])
         # A limit of shells that only a search for the fewest keeps is kept.
@@ -457,8 +401,8 @@ class Fit(Case):
         self.assertIsNone(record["result"]["reached"])
         other = self.path("other.ply")
         self.relax(self.target, self.target, other, "--shells", 60, "--max-iterations", 1, "--threads", 2)
-        first, second = read_ply(self.out), read_ply(other)
-        self.assertTrue((first[0] == second[0]).all() and (first[1] == second[1]).all())
+        first, second = Ply(self.out), Ply(other)
+        self.assertTrue((first.fields == second.fields).all() and (first.faces == second.faces).all())
 
     def test_refine_keeps_coarse_and_splits_it_where_the_tolerance_asks(self):
         coarse = self.path("coarse.ply")
@@ -479,16 +423,15 @@ class Fit(Case):
         self.assertLess(record["result"]["hausdorff_percent"]["upper"], 0.2)
 
     def test_fewer_shells_than_the_topology_needs_are_4(self):
-        _, error = self.relax(self.target, self.target, self.out, "--shells", 3, expect=4)
-        self.assertIn("pieces, holes and handles", error)
-        self.assertLess(len(read_ply(self.out + ".part")[1]), 40)
+        self.relax(self.target, self.target, self.out, "--shells", 3, code=4, says="pieces, holes and handles")
+        self.assertLess(len(Ply(self.out + ".part").triangles), 40)
 
     def test_triangles_without_area_are_3(self):
         line, points = self.path("line.ply"), np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [4.0, 0, 0]])
         write_ply(line, points, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
         for rules in (["--shells", 4], ["--tolerance", "1%"], ["--refine", "--tolerance", "1%"],
                       ["--surface", "watertight", "--tolerance", "1%"]):
-            _, error = self.relax(line, line, self.out, *rules, expect=3)
+            _, error = self.relax(line, line, self.out, *rules, code=3)
             self.assertRegex(error, "no area|without area")
             self.assertFalse(os.path.exists(self.out))
 
@@ -501,7 +444,7 @@ class Fit(Case):
         roots = [(y * (n + 1), (y + 1) * (n + 1)) for y in range(2, n - 1, 3)]
         for _, end in roots:
             vertices[end] = (-0.5, *vertices[end][1:])
-        for length, rules, expect in ((0.2, ["--tolerance", "2%"], 0), (3, ["--tolerance", "2%"], 4),
+        for length, rules, code in ((0.2, ["--tolerance", "2%"], 0), (3, ["--tolerance", "2%"], 4),
                                       (3, ["--shells", 40], 0), (3, ["--refine", "--tolerance", "20%"], 0),
                                       (3, ["--method", "barycentre", "--max-iterations", 2], 0)):
             tips = []  # on the lines of boundary edges
@@ -509,15 +452,15 @@ class Fit(Case):
                 along = np.subtract(vertices[end], vertices[start])
                 tips.append(np.array(vertices[end]) + length * along / np.linalg.norm(along))
             write_ply(spiked, vertices + tips, triangles + [(*root, len(vertices) + i) for i, root in enumerate(roots)])
-            record, said = self.relax(spiked, spiked, self.out, *rules, "--force", expect=expect)
+            record, said = self.relax(spiked, spiked, self.out, *rules, "--force", code=code)
             self.assertIn("spikes without area, up to", said)
             result = record["result"]
             self.assertGreater(result["min_angle_deg"], 1)
             self.assertGreater(result["hausdorff_mm"]["upper"], 0.4 * length)
-            self.assertEqual(result["reached"], {0: True if "--tolerance" in rules else None, 4: False}[expect])
-            if expect == 4:
+            self.assertEqual(result["reached"], {0: True if "--tolerance" in rules else None, 4: False}[code])
+            if code == 4:
                 self.assertIn("no shells reach the target's spikes without area", said)
-                self.assertLess(len(read_ply(self.out + ".part")[1]), 60)
+                self.assertLess(len(Ply(self.out + ".part").triangles), 60)
 
     def test_caps_without_area_make_no_creases(self):
         ball, faces = sphere(3)
@@ -562,12 +505,12 @@ class Fit(Case):
         record, _ = self.relax(self.path("pieces.ply"), self.path("pieces.ply"), self.out, "--tolerance", "0.5%")
         self.assertLessEqual(record["result"]["hausdorff_percent"]["upper"], 0.5)
         self.assertLess(record["result"]["shells"], 120)
-        triangles = read_ply(self.out)[1]
+        triangles = Ply(self.out).triangles
         self.assertEqual(len(triangles), record["result"]["shells"])
 
     def test_a_surface_of_another_topology_is_covered_as_far_as_it_can_be(self):
         write_ply(self.path("closed.ply"), *sphere(1, 12))
-        record, error = self.relax(self.path("closed.ply"), self.target, self.out, "--tolerance", "1%", expect=4)
+        record, error = self.relax(self.path("closed.ply"), self.target, self.out, "--tolerance", "1%", code=4)
         self.assertIn("boundary loop", error)
         self.assertIn("not reached", error)
         self.assertTrue(os.path.exists(self.out + ".part"))
@@ -575,7 +518,7 @@ class Fit(Case):
     def test_tolerance_that_the_count_does_not_allow_is_4(self):
         for most in ("--shells", "--max-shells"):
             record, _ = self.relax(self.target, self.target, self.out, "--tolerance", "0.3%", most, 20,
-                                   "--max-iterations", 1, expect=4)
+                                   "--max-iterations", 1, code=4)
             self.assertIs(record["result"]["reached"], False)
             self.assertLessEqual(record["result"]["shells"], 20)
             self.assertTrue(os.path.exists(self.out + ".part"))
@@ -636,15 +579,14 @@ class Fit(Case):
             counts[thickness] = result["shells"]
         self.assertLess(counts["16mm"], counts["4mm"])
         record, error = self.relax(coarse, bumpy, self.out, "--refine", "--tolerance", "1%t", "--thickness", "1mm",
-                                   "--max-shells", 90, "--force", expect=4)
+                                   "--max-shells", 90, "--force", code=4)
         self.assertIs(record["result"]["reached"], False)
         self.assertIn("a mean distance of", error)
         for arguments, says in ((("--tolerance", "2%t"), "give --thickness too"), (("--thickness", "1mm"), "belongs to"),
                                 (("--tolerance", "2t", "--thickness", "1mm"), "percentage"),
                                 (("--tolerance", "1%", "--thickness", "1mm"), "belongs to"),
                                 (("--tolerance", "0%t", "--thickness", "1mm"), "greater than zero")):
-            _, error = self.relax(bumpy, bumpy, self.out, *arguments, "--force", expect=2)
-            self.assertIn(says, error)
+            self.relax(bumpy, bumpy, self.out, *arguments, "--force", code=2, says=says)
 
     def test_an_angle_that_cannot_be_kept_is_told(self):
         corners = np.array([[0, 0, 0], [40, 0, 0], [40, 4, 0], [20, 6, 0]], float)
@@ -662,7 +604,7 @@ class MidSurface(Case):
         write_ply(self.ball, *sphere(3, 10.0))
 
     def points(self):
-        return columns(read_ply(self.out)[0], "xyz")
+        return Ply(self.out).vertices
 
     def test_of_a_sphere_is_a_sphere_half_a_wall_away(self):
         write_ply(self.ball, *sphere(4, 10.0))
@@ -723,10 +665,7 @@ class MidSurface(Case):
             said = file.read().replace(b"\nelement vertex", b"\ncomment face inner\nelement vertex", 1)
         with open(tube, "wb") as file:
             file.write(said)
-        done = subprocess.run([os.path.join(BIN, "tunica-relax"), tube, tube, self.out, "--mid-surface", "outer", "--thickness", "1mm"],
-                              capture_output=True, text=True)
-        self.assertEqual(done.returncode, 3)
-        self.assertIn("is the inner face of a wall", done.stderr)
+        self.relax(tube, tube, self.out, "--mid-surface", "outer", "--thickness", "1mm", code=3, says="is the inner face of a wall")
 
     def test_by_the_papers_rule_and_with_coarse_triangles_kept(self):
         coarse = self.path("coarse.ply")
@@ -740,9 +679,8 @@ class MidSurface(Case):
     def test_a_face_turned_inward_is_turned_around(self):
         points, triangles = sphere(3, 10.0)
         write_ply(self.ball, points, triangles[:, ::-1])
-        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--thickness", "2mm",
-                              "--max-iterations", 1)
-        self.assertIn("its normals point inward", error)
+        self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--thickness", "2mm",
+                   "--max-iterations", 1, says="its normals point inward")
         np.testing.assert_allclose(np.linalg.norm(self.points(), axis=1), 11, atol=0.05)
 
     def narrow_torus(self):
@@ -762,13 +700,10 @@ class MidSurface(Case):
         words = self.narrow_torus()
         reached = 0
         for tolerance in ("4%", "3%", "2.5%"):
-            done = subprocess.run([os.path.join(BIN, "tunica-relax"), *words, "--force", "--tolerance", tolerance,
-                                   "--max-iterations", "1", "--report", self.path("report.json")], capture_output=True, text=True)
-            self.assertIn(done.returncode, (0, 4), done.stderr)
-            self.assertIn("0 rim(s) and 0 handle(s), TARGET has 0 and 1", done.stderr)
-            with open(self.path("report.json")) as file:
-                self.assertEqual(json.load(file)["result"]["self_intersections"], 0)
-            reached += done.returncode == 0
+            record, _ = self.relax(*words, "--force", "--tolerance", tolerance, "--max-iterations", "1", code=(0, 4),
+                                   says="0 rim(s) and 0 handle(s), TARGET has 0 and 1")
+            self.assertEqual(record["result"]["self_intersections"], 0)
+            reached += record["ok"]
         self.assertGreaterEqual(reached, 2)
 
     def test_between_two_faces_measures_the_thickness(self):
@@ -785,31 +720,24 @@ class MidSurface(Case):
         scene = ('[run]\nkind = "static"\n[[shell]]\nname = "s"\nmesh = "out.ply"\nthickness_from = "thickness"\n'
                  'young = "1MPa"\npoisson = 0.3\n[[fix]]\nbody = "s"\nwhere = {rigid_motions = true}\n'
                  '[[load]]\nbody = "s"\nkind = "pressure"\nvalue = "1kPa"\n')
-        with open(self.path("scene.toml"), "w", encoding="utf-8") as file:
-            file.write(scene)
-        subprocess.run([os.path.join(BIN, "tunica-simulate"), "--scene", self.path("scene.toml"), self.path("out.hdf"), "--quiet"],
-                       check=True)
-        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--other-face", inner,
-                              "--force", expect=3)
-        self.assertIn("the wall's other face lies inside the target", error)
-        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--other-face", self.ball,
-                              "--force", expect=3)
-        self.assertIn("is it the other face of the wall?", error)
+        self.run_tool("simulate", "--scene", self.write("scene.toml", scene), "out.hdf", "--quiet")
+        self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "inner", "--other-face", inner,
+                   "--force", code=3, says="the wall's other face lies inside the target")
+        self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--other-face", self.ball,
+                   "--force", code=3, says="is it the other face of the wall?")
 
     def test_a_wall_thicker_than_its_body_is_refused(self):
-        _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--thickness", "21mm",
-                              expect=4)
-        self.assertIn("ball.ply: no point inside is half of the wall, 10.5 mm, away", error)
+        self.relax(self.ball, self.ball, self.out, "--shells", 300, "--mid-surface", "outer", "--thickness", "21mm",
+                   code=4, says="ball.ply: no point inside is half of the wall, 10.5 mm, away")
         self.assertFalse(os.path.exists(self.out))
 
-    def test_misuse(self):
+    def test_wrong_usage_is_2(self):
         for arguments, says in ((("--mid-surface", "outer"), "needs the wall's thickness"),
                                 (("--mid-surface", "middle", "--thickness", "1mm"), "middle"),
                                 (("--mid-surface", "outer", "--thickness", "0mm"), "greater than zero"),
                                 (("--mid-surface", "outer", "--thickness", "1"), "has no unit"),
                                 (("--other-face", self.ball), "belongs to --mid-surface")):
-            _, error = self.relax(self.ball, self.ball, self.out, "--shells", 300, *arguments, expect=2)
-            self.assertIn(says, error)
+            self.relax(self.ball, self.ball, self.out, "--shells", 300, *arguments, code=2, says=says)
 
 
 class Patch(Case):
@@ -821,10 +749,9 @@ class Patch(Case):
         write_ply(self.path("coarse.ply"), coarse, coarse_triangles)
         self.relax(self.path("coarse.ply"), self.path("target.ply"), self.path("shell.ply"), "--surface", "comas",
                    "--curved", self.path("curved.ply"))
-        shell, triangles, _ = read_ply(self.path("shell.ply"))
-        points, normals = columns(shell, "xyz"), read_corner_normals(self.path("shell.ply"))
-        curved, fine, _ = read_ply(self.path("curved.ply"))
-        curved = columns(curved, "xyz")
+        shell, curved = Ply(self.path("shell.ply")), Ply(self.path("curved.ply"))
+        points, triangles, normals = shell.vertices, shell.triangles, shell.corner_normals()
+        curved, fine = curved.vertices, curved.triangles
         size = np.linalg.norm(points.max(0) - points.min(0))
 
         # The fine vertices come patch by patch: a grid of level m has (m + 1)(m + 2) / 2 of them, rows along corner 3.
@@ -851,15 +778,12 @@ class Patch(Case):
         self.assertEqual(fine_used, len(fine))
 
 
-@unittest.skipUnless(os.path.isdir(MESHES), f"no real organs in {MESHES}")
+@unittest.skipUnless(MESHES.is_dir(), f"no real organs in {MESHES}")
 class Organs(Case):
     def test_an_open_aorta_within_a_percent_takes_no_more_shells_than_well_shaped_flat_triangles(self):
-        target, flat, report = os.path.join(MESHES, "vmtk_aorta_open.stl"), self.path("flat.ply"), self.path("flat.json")
-        unit = ["--mesh-unit", "mm"]
-        subprocess.run([os.path.join(BIN, "tunica-decimate"), target, flat, *unit, "--max-error", "1%", "--min-angle",
-                        "20", "--report", report], check=True, capture_output=True, timeout=300)
-        with open(report) as file:
-            triangles = json.load(file)["result"]["triangles"]
+        target, unit = MESHES / "vmtk_aorta_open.stl", ["--mesh-unit", "mm"]
+        flat = self.run_tool("decimate", target, "flat.ply", *unit, "--max-error", "1%", "--min-angle", 20)
+        triangles = flat["result"]["triangles"]
         record, _ = self.relax(target, target, self.path("shell.ply"), *unit, "--tolerance", "1%")
         result = record["result"]
         self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
@@ -873,7 +797,7 @@ class Organs(Case):
         # The lumen of a real aorta with its branches, closed and cut open.
         for name, rims in (("vmtk_aorta_gold.stl", 0), ("vmtk_aorta_open.stl", 3)):
             with self.subTest(name):
-                lumen = os.path.join(MESHES, name)
+                lumen = MESHES / name
                 record, error = self.relax(lumen, lumen, self.path("shell.ply"), "--mesh-unit", "mm", "--tolerance", "1%",
                                            "--mid-surface", "inner", "--thickness", "1.5mm", "--force")
                 self.assertIn("its normals point inward", error)
@@ -884,7 +808,7 @@ class Organs(Case):
                 self.assertLess(result["mid_surface"]["error_mm"]["mean"], 0.2)
 
 
-@unittest.skipUnless(os.path.isdir(PAPER), f"no paper meshes in {PAPER}")
+@unittest.skipUnless(PAPER.is_dir(), f"no paper meshes in {PAPER}")
 class PaperTargets(Case):
     """By the paper's rule."""
 
@@ -892,17 +816,16 @@ class PaperTargets(Case):
 
     def decimated(self, target, count):
         out = self.path("coarse.ply")
-        subprocess.run([os.path.join(BIN, "tunica-decimate"), target, out, "--triangles", str(count), "--min-angle", "10",
-                        "--mesh-unit", "mm", "--force"], check=True, capture_output=True, timeout=300)
+        self.run_tool("decimate", target, out, "--triangles", count, "--min-angle", 10, "--mesh-unit", "mm", "--force")
         return out
 
     def error(self, coarse, name, *arguments):
-        record, _ = self.relax(coarse, os.path.join(PAPER, name), self.path("shell.ply"), "--mesh-unit", "mm", "--force",
+        record, _ = self.relax(coarse, PAPER / name, self.path("shell.ply"), "--mesh-unit", "mm", "--force",
                                *arguments)
         return record["result"]
 
     def test_cylinder_is_below_the_flat_mesh_and_one_split_brings_a_tenth(self):
-        coarse = os.path.join(PAPER, "cylinderLowRes.obj")
+        coarse = PAPER / "cylinderLowRes.obj"
         first = self.error(coarse, "cylinderHighRes.obj", "--max-iterations", 1)
         self.assertEqual(first["shells"], 40)
         self.assertLess(first["hausdorff_percent"]["upper"], 2.01 * 0.6)  # the same shells with plain normals: 2.01
@@ -911,22 +834,21 @@ class PaperTargets(Case):
         self.assertLess(split["hausdorff_percent"]["upper"], first["hausdorff_percent"]["upper"] / 8)
 
     def test_liver_capsule_is_closer_than_the_papers(self):
-        target = os.path.join(PAPER, "liverHighRes.obj")
+        target = PAPER / "liverHighRes.obj"
         result = self.error(self.decimated(target, 1200), "liverHighRes.obj", "--max-iterations", 3)
         self.assertLessEqual(result["shells"], 1200)
         self.assertLess(result["hausdorff_percent"]["upper"], 4.48)  # the paper's
 
     def test_aneurysm_is_closer_than_the_papers_shells(self):
-        target = os.path.join(PAPER, "aneurysmHighRes.obj")
+        target = PAPER / "aneurysmHighRes.obj"
         for count, of_the_paper in ((200, 38), (800, 5.2)):
             result = self.error(self.decimated(target, count), "aneurysmHighRes.obj", "--max-iterations", 3)
             self.assertLess(result["hausdorff_percent"]["upper"], of_the_paper / 2)
 
     def test_a_non_manifold_coarse_mesh_of_the_paper_is_refused_with_its_place(self):
         for name in ("liverLowRes300.obj", "liverLowRes300_iteration1.obj"):
-            _, error = self.relax(os.path.join(PAPER, name), os.path.join(PAPER, "liverHighRes.obj"),
-                                  self.path("shell.ply"), "--mesh-unit", "mm", expect=3)
-            self.assertIn("near (", error)
+            self.relax(PAPER / name, PAPER / "liverHighRes.obj",
+                       self.path("shell.ply"), "--mesh-unit", "mm", code=3, says="near (")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import tempfile
 import unittest
 
 import cases
+from running import run_tool
 
 SOURCE = pathlib.Path(os.environ["TUNICA_SOURCE"])
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -68,7 +69,7 @@ class Browser(WithPackages):
 
     def look_at(self, out, scheme):
         page = self.folder / "page.html"
-        cases.run("report", out, "-o", page, "--force", "--quiet")
+        run_tool("report", out, "-o", page, "--force", "--quiet")
         with tempfile.TemporaryDirectory(prefix="tunica-profile-") as profile:
             run = subprocess.run(["node", pathlib.Path(__file__).with_suffix(".mjs"), self.web, CHROMIUM, profile, scheme,
                                   page], capture_output=True, text=True, timeout=300)
@@ -82,7 +83,7 @@ class Browser(WithPackages):
         self.assertEqual([name for name, changed in seen["changes"].items() if not changed], [])
         return seen
 
-    def test_case_turns(self):
+    def test_a_case_can_be_turned(self):
         for scheme in ("light", "dark"):
             seen = self.look_at(self.case, scheme)
             self.assertIn("Displacement", seen["legend"])

@@ -4,24 +4,15 @@ import atexit
 import functools
 import hashlib
 import json
-import os
 import pathlib
 import shutil
-import subprocess
 import tempfile
 
 import contact_scenes
 import numpy as np
+from running import run_tool
 
-TOOLS = pathlib.Path(os.environ["TUNICA_BIN"])
 STAGES = ["extract", "decimate", "relax", "simulate"]
-
-
-def run(verb, *words, code=0):
-    done = subprocess.run([TOOLS / f"tunica-{verb}", *map(str, words)], capture_output=True, text=True,
-                          errors="surrogateescape")
-    assert done.returncode == code, done.stderr
-    return done
 
 
 @functools.cache
@@ -31,13 +22,13 @@ def shells_of(shape):
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     volume, case = folder / f"{shape}.nii.gz", folder / "out" / shape / "1"
     case.mkdir(parents=True)
-    run("phantom", shape, volume, "--size", 24, "--spacing", 2)
+    run_tool("phantom", shape, volume, "--size", 24, "--spacing", 2)
     surface, coarse, shell = (case / name for name in ("surface.ply", "coarse.ply", "shell.ply"))
     open_border = [] if shape == "sphere" else ["--open-border"]
     for stage, words in (("extract", [volume, surface, "--label", 1, "--smooth", "staircase", *open_border]),
                          ("decimate", [surface, coarse, "--triangles", 200]),
                          ("relax", [coarse, surface, shell, "--max-iterations", 2])):
-        run(stage, *words, "--report", case / f"{stage}.json", "--quiet")
+        run_tool(stage, *words, "--quiet", report=case / f"{stage}.json")
     return case
 
 
@@ -47,7 +38,7 @@ def make_case(folder, shape="aneurysm", pressure="1kPa", solve=()):
     shutil.copytree(shells_of(shape), case)
     load = ["--pressure", pressure, "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--density",
             "1100kg/m3", "--fix", "rigid-motions" if shape == "sphere" else "boundary", "--static", *solve]
-    run("simulate", case / "shell.ply", case / "result.hdf", *load, "--report", case / "simulate.json", "--quiet")
+    run_tool("simulate", case / "shell.ply", case / "result.hdf", *load, "--quiet", report=case / "simulate.json")
     return case
 
 
@@ -64,7 +55,7 @@ def add_solid(case):
         "density = \"1000kg/m3\"\n[[fix]]\nbody = \"block\"\nwhere = {below = {axis = \"x\", at = \"61mm\"}}\ntranslation = \"xyz\"\n"
         "[[load]]\nbody = \"organ\"\nkind = \"pressure\"\nvalue = \"1kPa\"\n"
         "[[load]]\nbody = \"block\"\nkind = \"gravity\"\nvalue = [\"0mm/s2\", \"0mm/s2\", \"-9810mm/s2\"]\n")
-    run("simulate", "--scene", case / "scene.toml", case / "result.hdf", "--report", case / "simulate.json", "--quiet", "--force")
+    run_tool("simulate", "--scene", case / "scene.toml", case / "result.hdf", "--quiet", "--force", report=case / "simulate.json")
 
 
 def copy_case(case, out, name, change=lambda reports: None):

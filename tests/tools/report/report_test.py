@@ -2,7 +2,6 @@
 """tunica-report: what a page and its tables say, names that are hostile, --verify, --no-paths, size."""
 
 import base64
-import ctypes
 import csv
 import hashlib
 import html.parser
@@ -21,6 +20,7 @@ import h5py
 import numpy as np
 
 import cases
+from running import ToolTest, run_tool
 
 
 class Page(html.parser.HTMLParser):
@@ -77,7 +77,9 @@ def moves(header, arrays):
     return states, arrays[at:]
 
 
-class ReportTest(unittest.TestCase):
+class ReportTest(ToolTest):
+    verb = "report"
+
     @classmethod
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory(prefix="tunica-report-")
@@ -86,8 +88,7 @@ class ReportTest(unittest.TestCase):
         cls.case = cases.make_case(cls.source)
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tunica-report-"))
-        self.addCleanup(shutil.rmtree, self.folder)
+        super().setUp()
         self.out = self.folder / "out"
         self.page = self.folder / "page.html"
 
@@ -104,10 +105,10 @@ class ReportTest(unittest.TestCase):
                     report["warnings"] = []
             self.copy(f"organ-{i:03}", change)
 
-    def report(self, *words, folder=None, code=0):
-        done = cases.run("report", folder or self.out, "-o", self.page, "--force", *words, code=code)
+    def report(self, *words, folder=None, **options):
+        self.run_tool(folder or self.out, "-o", self.page, "--force", *words, **options)
         text = self.page.read_text(encoding="utf-8") if self.page.exists() else ""
-        return done, text, Page(text)
+        return self.done, text, Page(text)
 
 
 class CasePage(ReportTest):
@@ -145,8 +146,8 @@ class CasePage(ReportTest):
             self.assertIn(told, methods)
         self.assertNotIn("one cubic shape function", methods)
         load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--fix", "boundary", "--static"]
-        cases.run("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--bending", "comas", "--membrane", "cst",
-                  "--report", folder / "simulate.json", "--quiet", "--force")
+        run_tool("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--bending", "comas", "--membrane", "cst",
+                 "--quiet", "--force", report=folder / "simulate.json")
         _, _, page = self.report()
         methods = page.text[page.text.index("Methods, to paste"):]
         self.assertIn("constant-strain triangles (cst), in bending the 9-term cubic of [3] (comas)", methods)
@@ -226,15 +227,15 @@ class CasePage(ReportTest):
         folder = self.copy("aneurysm")
         load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "4mm", "--fix", "boundary", "--static",
                 "--accuracy", "0.02%", "--of", "displacement", "--target", folder / "surface.ply", "--max-shells", 3500]
-        cases.run("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--report", folder / "simulate.json", "--quiet",
-                  "--force", code=4)
+        run_tool("simulate", folder / "shell.ply", folder / "result.hdf", *load, "--quiet", "--force", code=4,
+                 report=folder / "simulate.json")
         _, _, page = self.report()
         found = re.search(r"Or, content with what was reached: (tunica-simulate .*)\n", page.text)
         if found is None:
             self.assertIn("Next, finer", page.text, "another reason than the number of shells")
             return
         words = shlex.split(found[1])[1:]
-        cases.run("simulate", *words, "--force")
+        run_tool("simulate", *words, "--force")
 
     def test_a_run_that_ended_early_has_no_answer(self):
         """Its last state is one under a part of the load."""
@@ -319,74 +320,61 @@ class CasePage(ReportTest):
                 np.testing.assert_allclose(level.astype(float), part * stress, atol=1.6)
             self.assertIn("Loaded; displacement drawn", text)
 
-    def test_damaged_results_are_named(self):
+    def test_damaged_data_of_a_page_are_named(self):
+        folder = self.copy("aneurysm")
+        path = folder / "result.page"
+        whole = path.read_bytes()
+        line, _, numbers_behind = whole.partition(b"\n")
+        header = json.loads(line)
+
+        def with_header(**changes):
+            return json.dumps({**header, **changes}).encode() + b"\n" + numbers_behind
+
+        corners = len(line) + 1 + 12 * header["points"]
+        damaged = [b"", b"\x89PNG", line, whole[:-1], whole + b"\0", b"[" * 100_000 + whole, b"[1]\n" + numbers_behind,
+                   with_header(format="tunica page 2"), with_header(points=-1), with_header(points=2**40), with_header(kind="flight"),
+                   with_header(states=[]), with_header(states=[[0, 0]]), with_header(states=[[0, 0, 0]] * 2000), with_header(pieces=3),
+                   with_header(points=header["points"] + 1), with_header(scene=None),
+                   whole[:corners] + struct.pack("<I", header["points"]) + whole[corners + 4:],
+                   whole[:len(line) + 1] + struct.pack("<f", float("nan")) + whole[len(line) + 5:]]
+        for data in damaged:
+            path.write_bytes(data)
+            _, text, page = self.report(folder=folder)
+            self.assertIn("result.page: is damaged, or no page of this version: run the simulation again", page.text)
+            self.assertIn("Drawn as imaged", text)
+        path.unlink()
+        os.mkfifo(path)
+        self.assertIn("result.page: is not a regular file", self.report(folder=folder)[2].text)
+
+    def test_a_result_of_an_older_version_is_told(self):
+        folder = self.copy("aneurysm")
+        (folder / "result.page").unlink()
+        _, text, page = self.report(folder=folder)
+        told = re.search(r"result\.page is missing, as in results of older versions: the loaded organ is not drawn; (.*) draws it", page.text)
+        self.assertRegex(told[1], r"^tunica-simulate .* --force$")
+        self.assertIn("Drawn as imaged", text)
+        self.assertIn("Membrane stress", page.text)
+
+    def test_a_long_motion_has_no_more_states_than_a_page_shows(self):
         with tempfile.TemporaryDirectory() as folder:
-            path = cases.make_case(pathlib.Path(folder), pressure="1Pa", solve=["--load-steps", "4"])
-            # Of a chunk shorter than it is said to be HDF5 1.10 reads what lies behind it in memory.
-            for chunk, skipped in ((b"twelve bytes", 0xff), (zlib.compress(b"twelve bytes"), 0)):
-                with h5py.File(path / "result.hdf", "r+") as file:
-                    file["tunica/nodes/displacement"].id.write_direct_chunk((0, 0, 0), chunk, filter_mask=skipped)
-                _, _, page = self.report(folder=path)
-                self.assertIn("tunica/nodes/displacement has chunks of another size", page.text)
-            # Where a chunk has no dimensions HDF5 1.10 divides by zero. Its layout in the file: version 3, class 2.
-            whole = (path / "result.hdf").read_bytes()
-            with h5py.File(path / "result.hdf") as file:
-                sides = (*file["tunica/history/time"].chunks, 8)
-            layout = re.compile(re.escape(bytes([3, 2, len(sides)])) + b".{8}" + re.escape(struct.pack("<2I", *sides)), re.S)
-            damaged = layout.sub(lambda found: found[0][:2] + bytes(1) + found[0][3:], whole)
-            self.assertNotEqual(damaged, whole)
-            (path / "result.hdf").write_bytes(damaged)
-            _, _, page = self.report(folder=path)
-            self.assertIn("result.hdf: is damaged: HDF5 fails on it", page.text)
-            (path / "result.hdf").write_bytes(whole)
-            with h5py.File(path / "result.hdf", "r+") as file:
-                shape = file["tunica/nodes/displacement"].shape
-                del file["tunica/nodes/displacement"]
-                file.create_dataset("tunica/nodes/displacement", data=np.zeros(shape), fletcher32=True)
-            _, _, page = self.report(folder=path)
-            self.assertIn("other filters than tunica-simulate writes", page.text)
-            # An index that holds two chunks at one place: the first is short, the other one is found.
-            whole_again = (path / "result.hdf").read_bytes()
-            with h5py.File(path / "result.hdf", "r+") as file:
-                del file["tunica/nodes/displacement"]
-                moved = file.create_dataset("tunica/nodes/displacement", shape, chunks=(1, *shape[1:]), compression=4)
-                moved[...] = np.random.default_rng(1).uniform(size=shape)
-                moved.id.write_direct_chunk((0, 0, 0), zlib.compress(b"twelve bytes"))
-                stored = moved.id.get_chunk_info_by_coord((1, 0, 0)).size
-            damaged = (path / "result.hdf").read_bytes()
-            at_one, at_none = (struct.pack("<2I4Q", stored, 0, row, 0, 0, 0) for row in (1, 0))
-            self.assertEqual(damaged.count(at_one), 1)
-            (path / "result.hdf").write_bytes(damaged.replace(at_one, at_none))
-            self.report(folder=path)
-            (path / "result.hdf").write_bytes(whole_again)
-            with h5py.File(path / "result.hdf", "r+") as file:
-                del file["VTKHDF/Points"]
-                file.create_dataset("VTKHDF/Points", (60_000_000, 3), float, chunks=(1000, 3))
-            _, _, page = self.report(folder=path)
-            self.assertIn("VTKHDF/Points claims more than the file can hold", page.text)
-            (path / "result.hdf").write_bytes(whole_again)
-            # Chunks that reach beyond the data are not deflated, the others are: h5py cannot ask for that.
-            with h5py.File(path / "result.hdf", "r+") as file:
-                del file["tunica/nodes/displacement"]
-                creation = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-                chunk = (shape[0] - 1, *shape[1:])
-                creation.set_chunk(chunk)
-                creation.set_deflate(4)
-                library = ctypes.CDLL(h5py.h5p.__file__)
-                self.assertEqual(library.H5Pset_chunk_opts(ctypes.c_int64(creation.id), 2), 0)
-                moved = h5py.h5d.create(file.id, b"tunica/nodes/displacement", h5py.h5t.NATIVE_DOUBLE,
-                                        h5py.h5s.create_simple(shape), creation)
-                moved.write(h5py.h5s.ALL, h5py.h5s.ALL, np.zeros(shape))
-                moved.write_direct_chunk((chunk[0], 0, 0), zlib.compress(np.zeros(chunk).tobytes()))
-            _, _, page = self.report(folder=path)
-            self.assertIn("other filters than tunica-simulate writes", page.text)
-            (path / "result.hdf").unlink()
-            os.mkfifo(path / "result.hdf")
-            _, _, page = self.report(folder=path)
-            self.assertIn("result.hdf: is not a regular file", page.text)
+            case = cases.make_case(pathlib.Path(folder))
+            run_tool("simulate", case / "shell.ply", case / "result.hdf", "--pressure", "1kPa", "--young", "1MPa", "--poisson",
+                     "0.45", "--thickness", "1.5mm", "--density", "1100kg/m3", "--fix", "boundary", "--duration", "50ms",
+                     "--step", "0.5ms", "--quiet", "--force", report=case / "simulate.json")
+            header, arrays = unpacked(self.report(folder=case)[2])
+            states, _ = moves(header, arrays)
+            self.assertEqual((len(states), header["states"][0], header["states"][-1]), (41, "As imaged", "At 0.05 s"))
+            seconds = [float(label.split()[1]) for label in header["states"][1:]]
+            self.assertLess(np.diff(seconds).max(), 2.1 * np.diff(seconds).min())
+            # The last of them is the last one of the result.
+            with h5py.File(case / "result.hdf") as file:
+                points = file["VTKHDF/NumberOfPoints"][0]
+                moved = np.abs(file["VTKHDF/PointData/displacement"][-points:]).max()
+            self.assertAlmostEqual(np.abs(states[-1][0]).max(), moved, delta=1e-4 * header["displacement"])
+            self.assertLess((case / "result.page").stat().st_size, 0.25 * (case / "result.hdf").stat().st_size)
 
     def test_states_of_a_bending_path_agree_with_those_that_the_grid_has(self):
-        # What the nodes say of the last state but one, against the grid of a run that ends there.
+        # The last state but one, against that of a run that ends there.
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             (folder / "path").mkdir()
@@ -417,18 +405,18 @@ class CasePage(ReportTest):
 
     def test_case_folder_alone_and_the_same_bytes_again(self):
         folder = self.copy("aneurysm")
-        _, first, page = self.report(folder=folder)
-        _, again, _ = self.report("--threads", 1, folder=folder)
+        _, first, page = self.report(folder=folder, report=False)  # the page has the command
+        _, again, _ = self.report("--threads", 1, folder=folder, report=False)
         self.assertEqual(first.replace(" --threads 1", ""), again.replace(" --threads 1", ""))
         self.assertIn("The organ", page.text)
 
     def test_what_cannot_be_drawn_is_told(self):
         folder = self.copy("aneurysm")
-        (folder / "result.hdf").write_bytes(b"\x89HDF no more")
+        (folder / "result.page").write_bytes(b"{}\nno more")
         (folder / "surface.ply").write_text("ply\nno more")
         self.copy("other", lambda reports: reports["extract"]["inputs"][0].update(path="missing.nii.gz"))
         _, _, page = self.report()
-        for told in ("result.hdf: cannot be read as HDF5", "surface.ply: ", "missing.nii.gz: "):
+        for told in ("result.page: is damaged", "surface.ply: ", "missing.nii.gz: "):
             self.assertIn(told, page.text)
 
     def test_changed_volume_is_not_shown(self):
@@ -639,7 +627,7 @@ class CohortPage(ReportTest):
             shutil.copytree(folder.parent, self.out / f"organ-{i:03}")
         record = [f"organ-{i:03}/1\torgan-{i % 10:03}/1\tsimulate\t0\tdone\n" for i in range(200)]
         (self.out / ".cases").write_text("".join(record))
-        cases.run("report", self.out, "-o", self.page, "--quiet")
+        self.run_tool(self.out, "-o", self.page, "--quiet")
         self.assertLess(self.page.stat().st_size, 25e6)
 
 
@@ -692,10 +680,9 @@ class HostileNames(ReportTest):
 
 class Errors(ReportTest):
     def refuse(self, code, *words, says, folder=None):
-        done, _, _ = self.report(*words, folder=folder, code=code)
-        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-        self.assertTrue(done.stderr.startswith("tunica-report: "))
-        self.assertIn(says, done.stderr)
+        self.report(*words, folder=folder, code=code)
+        self.assertEqual(self.done.stderr.count("\n"), 1, self.done.stderr)
+        self.assertIn(says, self.done.stderr)
 
     def test_verify_names_what_differs(self):
         folder = self.copy("aneurysm")
@@ -710,9 +697,9 @@ class Errors(ReportTest):
     def test_verify_names_a_chain_of_two_cases(self):
         case = self.copy("aneurysm")
         solved = {path.name: path.read_bytes() for path in case.iterdir() if path.stem in ("result", "simulate")}
-        cases.run("decimate", case / "surface.ply", case / "coarse.ply", "--triangles", 150, "--report", case / "decimate.json", "--force")
+        run_tool("decimate", case / "surface.ply", case / "coarse.ply", "--triangles", 150, "--force", report=case / "decimate.json")
         self.refuse(4, "--verify", says="relax.json: relax read another coarse.ply than decimate wrote")
-        cases.run("relax", case / "coarse.ply", case / "surface.ply", case / "shell.ply", "--report", case / "relax.json", "--force")
+        run_tool("relax", case / "coarse.ply", case / "surface.ply", case / "shell.ply", "--force", report=case / "relax.json")
         for name, content in solved.items():
             (case / name).write_bytes(content)
         self.refuse(4, "--verify", says="simulate.json: simulate read another shell.ply than relax wrote")
@@ -787,15 +774,14 @@ class Errors(ReportTest):
         self.assertIn("simulate.json: is not a JSON report", page.text)
         self.assertIn("Failed", page.text)
 
-    def test_outputs(self):
+    def test_an_existing_page_is_5_unless_forced(self):
         self.copy("aneurysm")
         self.page.write_text("mine")
-        done = cases.run("report", self.out, "-o", self.page, code=5)
-        self.assertIn("exists", done.stderr)
+        self.run_tool(self.out, "-o", self.page, code=5, says="exists")
         self.assertEqual(self.page.read_text(), "mine")
-        done = cases.run("report", self.out, "-o", self.folder / "page.txt", code=2)
-        self.assertIn(".html", done.stderr)
-        report = json.loads(cases.run("report", self.out, "-o", self.page, "--force", "--report", "-").stdout)
+        self.run_tool(self.out, "-o", "page.txt", code=2, says=".html")
+        self.run_tool(self.out, "-o", self.page, "--force", "--report", "-", report=False)
+        report = json.loads(self.done.stdout)
         self.assertEqual(report["outputs"], [{"path": str(self.page), "sha256": cases.sha256(self.page)}])
         self.assertEqual([pathlib.Path(entry["path"]).name for entry in report["inputs"]],
                          ["decimate.json", "extract.json", "relax.json", "simulate.json"])

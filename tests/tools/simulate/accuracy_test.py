@@ -1,14 +1,13 @@
 """tunica-simulate --accuracy: mesh and model chosen, the claim reported, what is not credible refused."""
 import json
 import os
-import subprocess
 import unittest
 
 import h5py
 
+from running import run_tool
 from support import SimulateTest, grid, sphere, write_ply
 
-COMPARE = os.path.join(os.environ["TUNICA_BIN"], "tunica-compare")
 WALL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm", "--pressure", "100Pa"]
 HELD = WALL + ["--fix", "rigid-motions", "--static"]
 EXACT = 100e-6 * 100 * 0.7 / (2 * 1 * 0.5)  # mm: p r^2 (1 - nu) / (2 E t)
@@ -38,16 +37,14 @@ class AccuracyTest(SimulateTest):
         with h5py.File(self.path("out.hdf")) as file:
             self.assertEqual(json.loads(file["tunica/accuracy"][()])["of"], "displacement")
             self.assertEqual(len(file["tunica/elements/nodes"]), result["shells"])
-        subprocess.run([COMPARE, "fine.ply", "target.ply", "--shell", "--report", "compare.json"], cwd=self.folder, check=True,
-                       capture_output=True)
-        with open(self.path("compare.json"), encoding="utf-8") as file:
-            distance = json.load(file)["result"]["hausdorff_percent"]
+        compared = run_tool("compare", "fine.ply", "target.ply", "--shell", folder=self.folder).report["result"]
+        distance = compared["hausdorff_percent"]
         self.assertLessEqual(distance["lower"], claim["hausdorff_percent"]["upper"])
         self.assertGreaterEqual(distance["upper"], claim["hausdorff_percent"]["lower"])
         self.assertLessEqual(claim["hausdorff_percent"]["upper"] - claim["hausdorff_percent"]["lower"], 0.01 + 1e-9)
         again = self.run_tool("fine.ply", "again.hdf", *HELD)["result"]
         self.assertAlmostEqual(again["max_displacement_mm"] / claim["value"], 1, places=2)
-        self.assertEqual([entry["path"] for entry in report["outputs"]], ["out.hdf", "fine.ply"])
+        self.assertEqual([entry["path"] for entry in report["outputs"]], ["out.hdf", "out.page", "fine.ply"])
         self.assertEqual([entry["path"] for entry in report["inputs"]], ["ball.ply", "target.ply"])
 
     def test_the_border_of_a_load_is_part_of_the_claim(self):
@@ -75,10 +72,8 @@ value = "1kPa"
 where = {above = {axis = "z", at = "2mm"}}
 """)
         exact = 0.2294  # by meshes with rings of nodes at both borders
-        self.run_tool("--scene", "scene.toml", "out.hdf", "--max-shells", "6000", expect=4)
-        self.assertIn("accuracy not reached", self.done.stderr)
-        with open(self.path("report.json"), encoding="utf-8") as file:
-            claim = json.load(file)["result"]["accuracy"]
+        claim = self.run_tool("--scene", "scene.toml", "out.hdf", "--max-shells", "6000", code=4,
+                              says="accuracy not reached")["result"]["accuracy"]
         self.assertLess(abs(claim["value"] / exact - 1), claim["estimate_percent"] / 100)
 
     def test_membrane_stress_that_the_linear_model_has_not(self):
@@ -106,28 +101,25 @@ where = {above = {axis = "z", at = "2mm"}}
                                tuple(choice["chosen"] for choice in claim["choices"])) for claim in claims}), 1)
 
     def test_what_is_not_credible_is_refused_and_kept_as_part(self):
-        self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "0.01%", "--target", "target.ply", "--max-shells", "1500",
-                      "--shell-out", "fine.ply", expect=4)
+        report = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "0.01%", "--target", "target.ply", "--max-shells",
+                               "1500", "--shell-out", "fine.ply", code=4, says="more than 1500")
         self.assertRegex(self.done.stderr, r"accuracy not reached: displacement [0-9.]+ mm with \d+ shells, "
                          r"(error not estimated|estimated error [0-9.]+ %), 0.01 % asked: ")
-        self.assertIn("more than 1500", self.done.stderr)
         self.assertEqual(sorted(name for name in os.listdir(self.folder) if name.startswith(("out", "fine"))),
                          ["fine.ply.part", "out.hdf.part"])
-        with open(self.path("report.json"), encoding="utf-8") as file:
-            result = json.load(file)["result"]
-        self.assertGreater(result["newton_iterations"], 0, "of the last level")
+        self.assertGreater(report["result"]["newton_iterations"], 0, "of the last level")
 
     def test_beyond_the_limit_load_the_second_mesh_is_the_last(self):
         """A sphere has no equilibrium above half of 2 E t / (1 - nu) r: finer meshes have none either."""
         self.run_tool("ball.ply", "out.hdf", *WALL[:-2], "--pressure", "0.1MPa", "--fix", "rigid-motions", "--static",
-                      "--accuracy", "2%", "--target", "target.ply", expect=4)
+                      "--accuracy", "2%", "--target", "target.ply", code=4)
         lines = self.done.stderr.strip().splitlines()
         self.assertIn("no stable static equilibrium beyond load factor", lines[-1])
         levels = [line for line in lines if " shells: " in line and "load factor" in line]
         self.assertEqual(len(levels), 1, "the coarsest, and why it has no answer")
         self.assertIn("80 shells: ", levels[0])
 
-    def test_usage_errors(self):
+    def test_wrong_usage_is_2(self):
         for arguments, says in (
                 ([*HELD, "--of", "energy"], "--of belongs to --accuracy"),
                 ([*HELD, "--accuracy", "2"], "2"),
@@ -138,9 +130,8 @@ where = {above = {axis = "z", at = "2mm"}}
                 ([*HELD, "--accuracy", "2%", "--cg-iterations", "5"], "asks for convergence"),
                 ([*HELD, "--accuracy", "2%", "--max-shells", "0"], "--max-shells"),
                 ([*HELD, "--max-shells", "500"], "--max-shells belongs to --accuracy")):
-            self.run_tool("ball.ply", "out.hdf", *arguments, expect=2)
-            self.assertIn(says, self.done.stderr)
-            self.assertFalse(os.path.exists(self.path("out.hdf")))
+            self.run_tool("ball.ply", "out.hdf", *arguments, code=2, says=says)
+            self.assertFalse(self.exists("out.hdf"))
 
     SCENE = """[run]
 kind = "static"
@@ -212,23 +203,18 @@ within = "2%"
                            ('of = {probe = "tip", axis = "z"}\n', 'no [[probe]] "tip"'),
                            ('of = "weight"\n', "weight"), ('target = "target.ply"\n', "must be a table"),
                            ('of = {probe = "top"}\n', "no 'axis'"), ("beyond = 3\n", "unknown key 'beyond'")):
-            self.run_tool(*self.scene(more), "out.hdf", expect=3)
-            self.assertIn(says, self.done.stderr)
-            self.assertIn("scene.toml:", self.done.stderr)
+            self.run_tool(*self.scene(more), "out.hdf", code=3, says=[says, "scene.toml:"])
         for found, replaced, says in (('kind = "static"', 'kind = "buckling"', "no single answer"),
                                       ('within = "2%"', 'within = "60%"', "at most 50%"),
                                       ('kind = "static"', 'kind = "static"\nload_steps = 3', "leave out the load steps"),
                                       ('where = {rigid_motions = true}',
                                        'where = {nodes = [0]}\ntranslation = "xyz"\nrotation = ""', "a list of nodes")):
-            self.run_tool(*self.scene("", self.SCENE.replace(found, replaced, 1)), "out.hdf", expect=3)
-            self.assertIn(says, self.done.stderr)
+            self.run_tool(*self.scene("", self.SCENE.replace(found, replaced, 1)), "out.hdf", code=3, says=says)
         scene = self.scene('target = {ball = "target.ply"}\n')
         for flags, says in ((["--accuracy", "2%"], "contradict each other"), (["--shell-out", "fine.ply"], "more than one body")):
-            self.run_tool(*scene, "out.hdf", *flags, expect=3 if "2%" in flags else 2)
-            self.assertIn(says, self.done.stderr)
+            self.run_tool(*scene, "out.hdf", *flags, code=3 if "2%" in flags else 2, says=says)
         self.run_tool(*self.scene("", self.SCENE.split("[accuracy]")[0]), "out.hdf", "--accuracy", "2%", "--target",
-                      "target.ply", expect=2)
-        self.assertIn("name each one's in [accuracy]", self.done.stderr)
+                      "target.ply", code=2, says="name each one's in [accuracy]")
 
     def test_a_slow_ramp_is_taken_as_rest(self):
         motion = [*WALL, "--density", "1g/cm3", "--duration", "100ms", "--step", "10ms", "--ramp", "80ms", "--fix",
@@ -252,19 +238,17 @@ within = "2%"
                               "--force")["result"]["accuracy"]
         self.assertIsNone(claim["surface_uncertainty_mm"])
 
-    def test_bad_input(self):
+    def test_unfit_inputs_are_3(self):
         write_ply(self.path("far.ply"), sphere(2, 10)[0] + 1e4, sphere(2, 10)[1])
         vertices, triangles = sphere(2, 10)[:2]
         write_ply(self.path("torn.ply"), vertices, [*triangles, triangles[0][::-1]])
         write_ply(self.path("other.ply"), sphere(4, 10)[0] * [1, 1, 0.3], sphere(4, 10)[1])
         write_ply(self.path("coarse.ply"), *sphere(1, 10)[:2])
         for target in ("nothing.ply", "far.ply", "torn.ply", "other.ply", "coarse.ply"):
-            self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", target, expect=3)
-            self.assertIn(target, self.done.stderr)
+            self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", target, code=3, says=target)
         write_ply(self.path("plate.ply"), *grid(4, 4, 10, 10))
         self.run_tool("plate.ply", "out.hdf", *WALL, "--fix", "boundary", "--static", "--accuracy", "2%", "--of", "volume",
-                      expect=3)
-        self.assertIn("encloses no volume", self.done.stderr)
+                      code=3, says="encloses no volume")
 
 
 if __name__ == "__main__":

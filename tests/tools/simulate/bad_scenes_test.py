@@ -47,7 +47,7 @@ class BadScenes(SimulateTest):
     def named(self, scene, *words, place=None):
         """Exit 3 and all the words in one line, which begins with the place of the scene's last line that holds `place`."""
         self.write("scene.toml", scene)
-        self.run_tool("--scene", "scene.toml", "--check", expect=3)
+        self.run_tool("--scene", "scene.toml", "--check", code=3)
         line = self.done.stderr.strip().splitlines()[-1]
         for word in words:
             self.assertIn(word, line)
@@ -58,8 +58,7 @@ class BadScenes(SimulateTest):
     def refused(self, scene, message):
         """By the run, not by --check."""
         self.write("scene.toml", scene)
-        self.run_tool("--scene", "scene.toml", "out.hdf", expect=3)
-        self.assertIn(message, self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", code=3, says=message)
 
     def noted(self, scene, *words):
         self.write("scene.toml", scene)
@@ -103,14 +102,12 @@ class BadScenes(SimulateTest):
         scene = (RUN + solid("far.vtk").split("[[fix]]", maxsplit=1)[0] + ball(1) + contact("cube", "ball", 'name = "c"\n') +
                  "[[load]]\nbody = \"cube\"\nkind = \"gravity\"\nvalue = [\"0m/s2\", \"0m/s2\", \"9.81m/s2\"]\n")
         self.write("scene.toml", scene.replace("poisson = 0.3", 'poisson = 0.3\ndensity = "1g/cm3"'))
-        self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
-        self.assertIn("nothing but contact could hold cube", self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", code=4, says="nothing but contact could hold cube")
 
     def test_bodies_that_never_meet(self):
         self.write("scene.toml", RUN + shell() + ball(5) + contact("plate", "ball", 'name = "c"\n') +
                    "[[load]]\nbody = \"plate\"\nkind = \"pressure\"\nvalue = \"-1Pa\"\n")
-        self.run_tool("--scene", "scene.toml", "out.hdf")
-        self.assertIn("c: nothing touches in any step: do these", self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", says="c: nothing touches in any step: do these")
 
     def test_a_body_that_meets_another_within_a_step_only(self):
         ramp = 'radius = [["0s", "1mm"], ["1ms", "3.1mm"], ["2ms", "1mm"]]'
@@ -193,7 +190,7 @@ class BadScenes(SimulateTest):
             self.write("scene.toml", '[run]\nkind = "static"\nload_steps = 1\n[[shell]]\nname = "p"\nmesh = "plate.ply"\n'
                        'thickness = "1mm"\nyoung = "1MPa"\npoisson = 0.3\n[[fix]]\nbody = "p"\nwhere = {boundary = true}\ntranslation = "xyz"\nrotation = "xyz"\n'
                        f'[[load]]\nbody = "p"\nkind = "pressure"\nvalue = "{value}"\n{ramp}')
-            self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=code)
+            self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=code)
             self.assertNotRegex(self.done.stderr, r"\b(inf|nan)\b")
             if code == 3:
                 self.assertIn("scene.toml:", self.done.stderr)

@@ -3,7 +3,6 @@
 import math
 import re
 import signal
-import subprocess
 import tempfile
 import time
 import unittest
@@ -12,7 +11,8 @@ import contact_scenes
 import contact_scenes_more as scenes
 import h5py
 import numpy as np
-from published import SIMULATE, Bench
+from published import Bench
+from running import ToolTest
 
 # A clamped plate on a flat, m: (b / a, force / load). Plate theory; and, half a wall above the flat with a rim that
 # holds it in its plane too, von Karman's theory by 80 axisymmetric elements. Without stretch these give the former.
@@ -20,11 +20,10 @@ PLATE = {2: (0.09406, 0.13146), 16: (0.47295, 0.41782)}
 STRETCHED_PLATE = {2: (0.07434, 0.10665), 16: (0.46657, 0.40308)}
 
 
-class Benchmarks(unittest.TestCase):
+class Benchmarks(ToolTest):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.bench = Bench(self.folder.name)
+        super().setUp()
+        self.bench = Bench(self.folder)
 
     def assert_part(self, value, answer, within):
         self.assertAlmostEqual(value / answer, 1, delta=within)
@@ -172,17 +171,13 @@ class Benchmarks(unittest.TestCase):
 
     def kill_and_resume(self, after):
         """Runs the scene again, kills that run after so many states, resumes it. @return after which step it went on"""
-        options = {"cwd": self.folder.name, "stderr": subprocess.PIPE, "text": True}
-        running = subprocess.Popen([SIMULATE, "--scene", "run.toml", "again.hdf", "--quiet"], **options)
+        running = self.start_tool("simulate", "--scene", "run.toml", "again.hdf", "--quiet")
         while running.poll() is None and self.states_of("again.hdf.part") < after:
             time.sleep(0.005)
         running.send_signal(signal.SIGKILL)
-        running.communicate()
-        self.assertEqual(running.returncode, -signal.SIGKILL)
-        done = subprocess.run([SIMULATE, "--resume", "again.hdf.part"], check=False, **options)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("goes on after step", done.stderr)
-        return int(re.search(r"goes on after step (\d+)", done.stderr)[1])
+        self.assertEqual(running.wait(), -signal.SIGKILL)
+        self.run_tool("simulate", "--resume", "again.hdf.part", says="goes on after step")
+        return int(re.search(r"goes on after step (\d+)", self.done.stderr)[1])
 
     def test_a_run_that_was_killed_in_contact_goes_on_to_the_bit(self):
         contact_scenes.ring(self.bench, 0.4, steps=200)

@@ -2,20 +2,19 @@
 """Contact against known answers, friction, balance, and what is refused."""
 import json
 import math
-import tempfile
 import unittest
 from pathlib import Path
 
 import numpy as np
 from contact_scenes import RING, SPHERE, block, ring, slope, sphere, tube, write_vtk
 from published import Bench, run_lines
+from running import ToolTest
 
 
-class Contact(unittest.TestCase):
+class Contact(ToolTest):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.bench = Bench(self.folder.name)
+        super().setUp()
+        self.bench = Bench(self.folder)
 
     def assert_sound(self, record, result):
         self.assertLess(result["balance"]["force"], 1e-12)

@@ -106,7 +106,7 @@ value = "10kPa"
 """
         self.write("scene.toml", scene)
         report = self.run_tool("--scene", "scene.toml", "out.hdf", "--export", "inp", "--export", "feb")
-        self.assertEqual([output["path"] for output in report["outputs"]], ["out.hdf", "out.inp", "out.feb"])
+        self.assertEqual([output["path"] for output in report["outputs"]], ["out.hdf", "out.page", "out.inp", "out.feb"])
         blocks, comments = read_inp(self.path("out.inp"))
         self.assertTrue(any("tunica-simulate" in line and "--export inp" in line for line in comments))
         nodes = np.array(rows_of(blocks, "NODE"))[:, 1:].astype(float)
@@ -287,13 +287,14 @@ value = ["0MPa", "0MPa", "-90MPa"]
             self.write("scene.toml", "[run]\n" + run + shell + more)
             for deck, refused in (("inp", inp), ("feb", feb)):
                 self.run_tool("--scene", "scene.toml", "out.hdf", "--export", deck, "--force", "--quiet",
-                              expect=2 * refused)
+                              code=2 * refused)
                 if refused:
                     self.assertIn("--export " + deck, self.done.stderr)
                     self.assertIn(both, self.done.stderr)
-                    self.assertEqual(sorted(os.listdir(self.folder)), ["ball.ply", "report.json", "scene.toml"])
+                    self.assertEqual(sorted(os.listdir(self.folder)), ["ball.ply", "scene.toml"])
                 else:
                     os.remove(self.path("out.hdf"))
+                    os.remove(self.path("out.page"))
                     os.remove(self.path("out." + deck))
 
 

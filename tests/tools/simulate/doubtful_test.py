@@ -38,8 +38,8 @@ class Doubtful(SimulateTest):
 
     def test_a_wall_without_an_inner_face(self):
         self.assertIn("is more than the radius of curvature", self.warned("ball.ply", *words(thickness="12mm"), *HELD)[0])
-        self.run_tool("ball.ply", "out.hdf", *words(thickness="21mm"), *HELD, "--force", expect=3)
-        self.assertIn("no inner face is left: is its unit right?", self.done.stderr)
+        self.run_tool("ball.ply", "out.hdf", *words(thickness="21mm"), *HELD, "--force", code=3,
+                      says="no inner face is left: is its unit right?")
 
     def test_points_far_from_every_node(self):
         def scene(z):
@@ -53,8 +53,8 @@ class Doubtful(SimulateTest):
             self.assertEqual(any("the nearest node lies" in text for text in told), said, told)
 
     def test_a_limit_load_far_below_the_pressure_doubts_the_stiffness(self):
-        self.run_tool("ball.ply", "out.hdf", *words(young="2kPa", pressure="16kPa"), *HELD, expect=4)
-        self.assertIn("bears grows with its Young's modulus, 2 kPa: is the unit of one of them wrong?", self.done.stderr)
+        self.run_tool("ball.ply", "out.hdf", *words(young="2kPa", pressure="16kPa"), *HELD, code=4,
+                      says="bears grows with its Young's modulus, 2 kPa: is the unit of one of them wrong?")
 
     def test_a_cavity_that_was_kept(self):
         points, triangles, normals = sphere(2, 10)
@@ -129,7 +129,7 @@ between = ["p", "p"]
         """A run of a body of these sheets that touches itself."""
         self.write("scene.toml", self.SELF)
         write_ply(self.path("mesh.ply"), points, triangles)
-        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=code)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=code)
 
     def test_sheets_that_lie_in_each_other(self):
         # Wall 0.2 mm; edges 2 mm. Vertices lie exactly above one another, so that no sample is beside a face.
@@ -162,10 +162,10 @@ between = ["p", "p"]
         self.write("scene.toml", self.SELF)
         for other, code in ((upright, 3), (beside, 0)):
             write_ply(self.path("mesh.ply"), np.vstack([flat, other]), np.vstack([triangles, triangles + len(flat)]))
-            self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=code)
+            self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=code)
         write_ply(self.path("mesh.ply"), np.vstack([flat, upright]), np.vstack([triangles, triangles + len(flat)]))
-        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=3)
-        self.assertIn("p passes through itself in the reference at (10, ", self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=3,
+                      says="p passes through itself in the reference at (10, ")
 
     def test_slices_that_are_thick_against_the_wall(self):
         def with_voxel(name, voxel):

@@ -78,7 +78,7 @@ class Modes(SimulateTest):
             (run("buckling") + plate + pulled, 4, "the loads buckle nothing"),
         ):
             self.write("scene.toml", scene)
-            report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=code)
+            report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=code)
             self.assertIn(says, report["error"])
 
 

@@ -56,7 +56,7 @@ class Paths(SimulateTest):
 
     def test_path_that_does_not_get_there(self):
         self.write("scene.toml", self.roof(self.UNTIL + "max_steps = 5", self.FORCE))
-        report = self.run_tool("--scene", "scene.toml", "out.hdf", expect=4)
+        report = self.run_tool("--scene", "scene.toml", "out.hdf", code=4)
         self.assertIn("ended after 5 steps", report["error"])
         self.assertEqual(len(report["result"]["probes"]["centre"]["load_factor"]), 6)
         with h5py.File(self.path("out.hdf.part")) as file:

@@ -1,11 +1,12 @@
 """Runs that are killed at any moment and go on: the same end as without, or a clear refusal."""
 import os
+import pathlib
 import random
+import re
 import resource
 import shutil
 import signal
 import struct
-import subprocess
 import time
 import unittest
 import zlib
@@ -13,7 +14,7 @@ import zlib
 import h5py
 import numpy as np
 
-from support import SIMULATE, SimulateTest, grid, sphere, write_ply
+from support import SimulateTest, grid, sphere, write_ply
 
 MATERIAL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm", "--solver", "direct"]
 STATIC = MATERIAL + ["--pressure", "1.5kPa", "--fix", "boundary", "--static", "--load-steps", "40", "--every", "2"]
@@ -36,20 +37,17 @@ class Resume(SimulateTest):
         write_ply(self.path("plate.ply"), *grid(8, 8, 20, 20))
         write_ply(self.path("ball.ply"), *sphere(1, 10))
 
-    def start(self, *arguments):
-        return subprocess.Popen([SIMULATE, *arguments, "--quiet"], cwd=self.folder, stderr=subprocess.PIPE, text=True)
-
     def stop(self, number, *arguments, after=0.0, states=0):
         """Runs and stops with a signal; returns whether the run was stopped before it was done."""
-        running = self.start(*arguments)
+        running = self.start_tool(*arguments, "--quiet")
         limit = time.monotonic() + 60
         while states and running.poll() is None and time.monotonic() < limit:
-            if os.path.exists(self.path(LEFT[2])) and os.path.getsize(self.path(LEFT[1])) > states:
+            if self.exists(LEFT[2]) and os.path.getsize(self.path(LEFT[1])) > states:
                 break
             time.sleep(0.002)
         time.sleep(after)
         running.send_signal(number)
-        error = running.communicate()[1]
+        self.said = error = running.communicate()[1]
         if running.returncode == 0:
             return False
         self.assertEqual(running.returncode, -9 if number == signal.SIGKILL else 128 + number, error)
@@ -77,10 +75,11 @@ class Resume(SimulateTest):
         while kills > 0:
             kills -= self.stop(signal.SIGKILL, *command, after=moments.uniform(0, usual))
             command = [mesh, "out.hdf", *words]
-            if os.path.exists(self.path("out.hdf")):  # done, or killed when it was
+            if self.exists("out.hdf"):  # done, or killed when it was
                 self.assert_same("whole.hdf", "out.hdf")
                 os.remove(self.path("out.hdf"))
-            elif os.path.exists(self.path(LEFT[1])) and os.path.getsize(self.path(LEFT[1])) > 0:
+                os.remove(self.path("out.page"))
+            elif self.exists(LEFT[1]) and os.path.getsize(self.path(LEFT[1])) > 0:
                 # else it was killed before it had begun to write
                 command = ["--resume", "out.hdf.part"]
         result = self.run_tool(*command)["result"]
@@ -88,7 +87,10 @@ class Resume(SimulateTest):
             self.assertEqual(result[key], whole["result"][key], key)
         self.assertAlmostEqual(result["max_displacement_mm"], whole["result"]["max_displacement_mm"], delta=1e-10)
         self.assert_same("whole.hdf", "out.hdf")
-        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("out.hdf.")], [])
+        self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("out.") and name.count(".") > 1], [])
+        pages = [pathlib.Path(self.path(name)).read_bytes() for name in ("whole.page", "out.page")]
+        self.assertEqual(*(page.partition(b"\n")[0] for page in pages))
+        self.assertEqual(*map(len, pages))
 
     def test_static_run_killed_many_times(self):
         self.killed_many_times("plate.ply", STATIC, 6, 1)
@@ -155,8 +157,7 @@ ramp = [["0s", 0.0], ["20ms", 1.0]]
 """)
             self.run_tool("--scene", "scene.toml", "whole.hdf", "--force")
             self.assertTrue(self.stop(signal.SIGKILL, "--scene", "scene.toml", "out.hdf", states=60_000))
-            self.run_tool("--resume", "out.hdf.part")
-            self.assertIn("goes on after step", self.done.stderr)
+            self.run_tool("--resume", "out.hdf.part", says="goes on after step")
             self.assert_same("whole.hdf", "out.hdf")
             os.remove(self.path("out.hdf"))
 
@@ -201,6 +202,18 @@ nearest = ["0mm", "0mm", "10mm"]
         np.testing.assert_allclose(probe["time_s"], whole["time_s"])
         self.assert_same("whole.hdf", "out.hdf")
 
+    def test_what_an_interrupt_advises_works(self):
+        """Also where an older result has the name of the one that was being written."""
+        for there in (False, True):
+            if there:
+                shutil.copy(self.path("ball.ply"), self.path("out.hdf"))
+            self.assertTrue(self.stop(signal.SIGINT, "ball.ply", "out.hdf", *DYNAMIC, "--force", states=50_000))
+            advised = re.search(r"stopped by signal 2: go on by tunica-simulate (.*)\n", self.said).group(1).split()
+            self.assertEqual(advised, ["--resume", "out.hdf.part", *["--force"] * there])
+            self.run_tool(*advised, says="goes on after step")
+            self.assertGreater(os.path.getsize(self.path("out.hdf")), 50_000)
+            os.remove(self.path("out.hdf"))
+
     def interrupted(self):
         self.assertTrue(self.stop(signal.SIGKILL, "ball.ply", "out.hdf", *DYNAMIC, states=100_000))
         for name in LEFT:
@@ -211,9 +224,9 @@ nearest = ["0mm", "0mm", "10mm"]
             shutil.copy(self.path("kept." + name), self.path(name))
 
     def refused(self, *words, says, code=3):
-        report = self.run_tool(*words, expect=code)
+        report = self.run_tool(*words, code=code)
         self.assertIn(says, report["error"])
-        self.assertFalse(os.path.exists(self.path("out.hdf")))
+        self.assertFalse(self.exists("out.hdf"))
 
     def test_another_run_is_refused_and_said_why(self):
         self.interrupted()
@@ -236,7 +249,7 @@ nearest = ["0mm", "0mm", "10mm"]
 
     def test_a_run_goes_on_where_its_folder_moved(self):
         self.interrupted()
-        before, self.folder = self.folder, self.path("moved")
+        before, self.folder = self.folder, self.folder / "moved"
         os.mkdir(self.folder)
         for name in (*LEFT, "ball.ply"):
             os.rename(os.path.join(before, name), self.path(name))
@@ -257,15 +270,14 @@ nearest = ["0mm", "0mm", "10mm"]
             os.rename(self.path(name), self.path("away." + name))
         self.refused("--resume", "out.hdf.part", says="no such file")
         self.write("out.hdf", "a result")
-        self.run_tool("--resume", "out.hdf.part", expect=3)
-        self.assertIn("is complete, there is nothing to resume", self.done.stderr)
+        self.run_tool("--resume", "out.hdf.part", code=3, says="is complete, there is nothing to resume")
         for name in LEFT:
             os.rename(self.path("away." + name), self.path(name))
-        self.run_tool("--resume", "out.hdf.part", expect=5)  # never replaced unasked
+        self.run_tool("--resume", "out.hdf.part", code=5)  # never replaced unasked
         os.remove(self.path("out.hdf"))
         self.run_tool("--resume", "out.hdf.part")
 
-    def test_damaged_files(self):
+    def test_damaged_files_are_named(self):
         self.interrupted()
         for name in LEFT[1:]:
             for place in (3, 40, 1500, 3500):
@@ -274,14 +286,12 @@ nearest = ["0mm", "0mm", "10mm"]
                     byte = file.read(1)
                     file.seek(place)
                     file.write(bytes([byte[0] ^ 0x55]))
-                self.run_tool("--resume", "out.hdf.part", expect=3)
-                self.assertIn(f"{name}: is damaged", self.done.stderr)
-                self.assertTrue(os.path.exists(self.path("out.hdf.part")))
+                self.run_tool("--resume", "out.hdf.part", code=3, says=f"{name}: is damaged")
+                self.assertTrue(self.exists("out.hdf.part"))
                 self.restore()
             for keep in (0, 10, 1500):
                 os.truncate(self.path(name), keep)
-                self.run_tool("--resume", "out.hdf.part", expect=3)
-                self.assertIn(f"{name}: is damaged", self.done.stderr)
+                self.run_tool("--resume", "out.hdf.part", code=3, says=f"{name}: is damaged")
                 self.restore()
         # A record that the kill cut short comes after the checkpoint, and is no damage. Neither is a spoilt result: it
         # is written anew.
@@ -304,29 +314,23 @@ nearest = ["0mm", "0mm", "10mm"]
             content = checkpoint[head + 4:steps] + struct.pack("<Q", 3 * 10**16) + checkpoint[steps + 8:]
             file.seek(head)
             file.write(struct.pack("<I", zlib.crc32(content)) + content)
-        self.run_tool("--resume", "out.hdf.part", expect=3)
-        self.assertIn(f"{LEFT[2]}: is damaged", self.done.stderr)
+        self.run_tool("--resume", "out.hdf.part", code=3, says=f"{LEFT[2]}: is damaged")
 
     def test_before_the_first_checkpoint_it_begins_again(self):
         self.interrupted()
         os.remove(self.path(LEFT[2]))
-        self.run_tool("--resume", "out.hdf.part")
-        self.assertIn("begins again", self.done.stderr)
+        self.run_tool("--resume", "out.hdf.part", says="begins again")
         self.run_tool("ball.ply", "whole.hdf", *DYNAMIC)
         self.assert_same("whole.hdf", "out.hdf")
 
     def test_two_at_once_are_refused(self):
         long = [word if word != "0.3s" else "300s" for word in DYNAMIC]
-        running = self.start("ball.ply", "out.hdf", *long)
-        self.addCleanup(running.stderr.close)
-        self.addCleanup(running.wait)
-        self.addCleanup(running.kill)
+        running = self.start_tool("ball.ply", "out.hdf", *long, "--quiet")
         limit = time.monotonic() + 60
-        while not os.path.exists(self.path(LEFT[2])) and time.monotonic() < limit:
+        while not self.exists(LEFT[2]) and time.monotonic() < limit:
             time.sleep(0.01)
-        self.run_tool("--resume", "out.hdf.part", expect=5)
-        self.assertIn("another run is writing it", self.done.stderr)
-        self.run_tool("ball.ply", "out.hdf", *long, expect=5)
+        self.run_tool("--resume", "out.hdf.part", code=5, says="another run is writing it")
+        self.run_tool("ball.ply", "out.hdf", *long, code=5, report=False)
         self.assertIsNone(running.poll())
 
     def test_a_full_disk_leaves_what_can_be_resumed_or_nothing(self):
@@ -334,13 +338,11 @@ nearest = ["0mm", "0mm", "10mm"]
         self.run_tool("ball.ply", "whole.hdf", *DYNAMIC)
         seen = set()
         for kibibytes in (8, 64, 128, 192, 256, 512):
-            done = subprocess.run([SIMULATE, "ball.ply", "out.hdf", *DYNAMIC, "--quiet"], cwd=self.folder, text=True,
-                                  capture_output=True, check=False, preexec_fn=lambda most=kibibytes << 10:
-                                  resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
-            self.assertEqual(done.returncode, 5, done.stderr)
-            kept = os.path.exists(self.path(LEFT[0]))
+            self.run_tool("ball.ply", "out.hdf", *DYNAMIC, "--quiet", code=5, report=False,
+                          limits={resource.RLIMIT_FSIZE: kibibytes << 10})
+            kept = self.exists(LEFT[0])
             seen.add(kept)
-            self.assertEqual(os.path.exists(self.path(LEFT[1])), kept, kibibytes)
+            self.assertEqual(self.exists(LEFT[1]), kept, kibibytes)
             if kept:
                 self.run_tool("--resume", "out.hdf.part")
                 self.assert_same("whole.hdf", "out.hdf")
@@ -349,9 +351,9 @@ nearest = ["0mm", "0mm", "10mm"]
 
     def test_a_failed_run_leaves_nothing_to_go_on_with(self):
         self.run_tool("ball.ply", "out.hdf", *MATERIAL, "--pressure", "10MPa", "--fix", "rigid-motions", "--static",
-                      expect=4)
-        self.assertTrue(os.path.exists(self.path(LEFT[0])))
-        self.assertFalse(os.path.exists(self.path(LEFT[1])))
+                      code=4)
+        self.assertTrue(self.exists(LEFT[0]))
+        self.assertFalse(self.exists(LEFT[1]))
         self.refused("--resume", "out.hdf.part", says="cannot be resumed")
 
 

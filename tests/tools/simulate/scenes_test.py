@@ -68,7 +68,7 @@ class Scenes(SimulateTest):
                 (free, f"{place(free, '[[shell]]')}:1: ", "can move freely"),
                 (twice, f"{place(twice, '[[fix]]', 2)}:1: ", f"scene.toml:{place(twice, '[[fix]]')}:1) and 1 mm along z"),
                 (path + body + held, "3:11: ", "arc length needs a load")):
-            self.simulate(scene, expect=3)
+            self.simulate(scene, code=3)
             self.assertTrue(self.done.stderr.startswith(f"tunica-simulate: scene.toml:{where}"), self.done.stderr)
             self.assertIn(says, self.done.stderr)
         self.write("scene.toml", lifted)
@@ -84,7 +84,7 @@ class Scenes(SimulateTest):
         vertices, triangles, normals = sphere(0, 10)
         normals[7] = [math.nan, 0, 1]
         write_ply(self.path("ball.ply"), vertices, triangles, normals)
-        self.simulate(STATIC + shell("ball.ply", 0.1, 1, 0.3) + fix("all = true"), expect=3)
+        self.simulate(STATIC + shell("ball.ply", 0.1, 1, 0.3) + fix("all = true"), code=3)
         self.assertIn("scene.toml:5:8: ", self.done.stderr)
         self.assertIn("ball.ply: the normal of vertex 7 has components that are no numbers", self.done.stderr)
 
@@ -154,7 +154,7 @@ class Scenes(SimulateTest):
         np.testing.assert_allclose(trace.mean(), -moment, rtol=0.02)
         np.testing.assert_allclose(elements["von_mises_top"].mean(), 0.05 * curvature * young, rtol=0.02)
 
-    def test_tapered_strip(self):
+    def test_a_tapered_strip_stretches_and_bends_by_its_formulas(self):
         """Thickness from the mesh, a to b linearly along the strip. Stretched by d: energy E w (a - b) d^2 / (2 L ln(a/b)).
         A force at the thin end: w = 12 P / (E w s^3) [ln t + 2 b/t - b^2 / 2 t^2] between b and a, s = (a - b) / L."""
         length, width, young, thick, thin = 100, 10, 2e5, 2.0, 0.5
@@ -195,7 +195,7 @@ class Scenes(SimulateTest):
         each = self.simulate(STATIC + body.replace("thickness = \"0.5mm\"", "thickness_from = \"thickness\"") + rest)
         self.assertAlmostEqual(each["max_displacement_mm"] / one, 1, delta=1e-9)
 
-    def test_prescribed_displacement(self):
+    def test_a_prescribed_displacement_stretches_by_hookes_law(self):
         """A strip stretched by 0.1 %: stress E e, energy E e^2 / 2 per volume."""
         write_ply(self.path("strip.ply"), *grid(8, 2, 40, 10))
         result = self.simulate(STATIC + shell("strip.ply", 1, 1000, 0) +
@@ -270,7 +270,7 @@ class Scenes(SimulateTest):
         self.assertEqual((result["shells"], result["nodes"]), (160, 84))
         a, b = (np.linalg.norm(self.last(result, name)) for name in "ab")
         self.assertAlmostEqual(b / a, 3, delta=1e-3)
-        self.simulate(scene.replace("\"3Pa\"", "\"100kPa\""), expect=4)
+        self.simulate(scene.replace("\"3Pa\"", "\"100kPa\""), code=4)
 
 
 if __name__ == "__main__":

@@ -121,8 +121,7 @@ class Sides(SimulateTest):
             file.writelines("f %d %d %d\n" % tuple(t + 1) for t in triangles[:, ::-1])
         rigid = '[[rigid]]\nname = "tool"\nmesh = "ball.obj"\nunit = "mm"\n[[contact]]\nbetween = ["wall", "tool"]\n'
         self.write("scene.toml", SCENE.format("lps.ply", "1 kPa") + rigid)
-        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", expect=3)
-        self.assertIn("SPACE=RAS", self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--force", code=3, says="SPACE=RAS")
         self.write("scene.toml", SCENE.format("outward.ply", "1 kPa") + rigid)  # it says nothing of its space
         report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force")
         self.assertIn("faces inward", self.kinds(report))

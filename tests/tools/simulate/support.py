@@ -1,16 +1,8 @@
 """Meshes of known shells, and how the tests run tunica-simulate."""
-import json
-import os
-import shutil
-import subprocess
-import tempfile
-import unittest
-
 import numpy as np
 
 from meshes import geodesic_sphere as sphere, write_ply_mm as write_ply
-
-SIMULATE = os.path.join(os.environ["TUNICA_BIN"], "tunica-simulate")
+from running import ToolTest
 
 
 def grid(columns, rows, length, width):
@@ -26,42 +18,13 @@ def grid(columns, rows, length, width):
     return vertices, np.array(triangles)
 
 
-class SimulateTest(unittest.TestCase):
-    """Each test has a folder of its own."""
+class SimulateTest(ToolTest):
+    verb = "simulate"
 
-    def setUp(self):
-        self.folder = tempfile.mkdtemp(prefix="tunica-simulate-")
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+    def run_tool(self, *words, **options):
+        return super().run_tool(*words, **{"report": "--check" not in words, **options})
 
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    def write(self, name, text):
-        with open(self.path(name), "w", encoding="utf-8") as file:
-            file.write(text)
-        return self.path(name)
-
-    def run_tool(self, *arguments, expect=0, **options):
-        """Runs the tool in the folder; returns its report (None where it wrote none)."""
-        report = self.path("report.json")
-        if os.path.exists(report):
-            os.remove(report)
-        command = [SIMULATE, *arguments]
-        if "--check" not in arguments:
-            command += ["--report", report]
-        self.done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=300,
-                                   check=False, **options)
-        self.assertEqual(self.done.returncode, expect, self.done.stderr)
-        if expect != 0:
-            lines = self.done.stderr.strip().splitlines()
-            self.assertTrue(lines[-1].startswith("tunica-simulate: "), lines)
-        if not os.path.exists(report):
-            return None
-        with open(report, encoding="utf-8") as file:
-            return json.load(file)
-
-    def simulate(self, scene, expect=0):
+    def simulate(self, scene, code=0):
         """Runs a scene given as text; returns the report's result."""
         self.write("scene.toml", scene)
-        report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force", "--quiet", expect=expect)
-        return report["result"]
+        return self.run_tool("--scene", "scene.toml", "out.hdf", "--force", "--quiet", code=code)["result"]

@@ -1,32 +1,22 @@
 #!/usr/bin/python3
 """`--imaged-at` with `--unloaded`: the shape that an organ has without the pressure under which it was imaged."""
-import json
 import math
-import os
-import subprocess
 import unittest
 
 import numpy as np
+from meshes import Ply
 from published import fix, grid, load, run_lines, shell
+from running import run_tool
 from support import SimulateTest, sphere, write_ply
 
 YOUNG, POISSON = 1.0, 0.3  # MPa
 WALL = ("--young", "1MPa", "--poisson", "0.3", "--static")
 
 
-def read_shells(path):
-    """Vertices (n x 3) and normals of a binary PLY as the tools write it."""
-    with open(path, "rb") as file:
-        header, body = file.read().split(b"end_header\n", 1)
-    lines = header.decode().splitlines()
-    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
-    return np.frombuffer(body, "<f8", 6 * count).reshape(-1, 6)
-
-
 class Unloaded(SimulateTest):
-    def imaged(self, mesh, pressure, *more, expect=0):
+    def imaged(self, mesh, pressure, *more, code=0):
         return self.run_tool(mesh, "out.hdf", *WALL, "--pressure", f"{pressure!r}MPa", "--imaged-at", f"{pressure!r}MPa",
-                             "--unloaded", "unloaded.ply", "--force", *more, expect=expect)
+                             "--unloaded", "unloaded.ply", "--force", *more, code=code)
 
     def test_a_sphere_shrinks_by_its_formula(self):
         """p R0 / (E t) = 2 / (1 - nu) e / (1 + e)^2, R = (1 + e) R0: a linear law in engineering strains. By a third, too."""
@@ -57,7 +47,7 @@ class Unloaded(SimulateTest):
                  load("pressure", f"{pressure!r}MPa", more=f'imaged_at = "{pressure!r}MPa"\n'))
         self.write("scene.toml", scene)
         self.run_tool("--scene", "scene.toml", "out.hdf", "--unloaded", "unloaded.ply")
-        found = np.hypot(*read_shells(self.path("unloaded.ply")).T[:2])
+        found = np.hypot(*Ply(self.path("unloaded.ply")).vertices.T[:2])
         np.testing.assert_allclose(found, radius / (1 + strain), rtol=1e-3)
 
     def test_a_loaded_shape_goes_back_to_where_it_came_from(self):
@@ -84,20 +74,16 @@ class Unloaded(SimulateTest):
         write_ply(self.path("image.ply"), points * axes + displacement, triangles, turned)
         report = self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "8kPa", "--imaged-at", "4kPa", *thin,
                                "--unloaded", "back.ply", "--force")["result"]
-        back = read_shells(self.path("back.ply"))
+        back = Ply(self.path("back.ply"))
         largest = np.linalg.norm(displacement, axis=1).max()
-        self.assertLess(np.linalg.norm(back[:, :3] - points * axes, axis=1).max(), 5e-3 * largest)
-        self.assertLess(np.linalg.norm(back[:, 3:] - normals, axis=1).max(), 5e-3)
+        self.assertLess(np.linalg.norm(back.vertices - points * axes, axis=1).max(), 5e-3 * largest)
+        self.assertLess(np.linalg.norm(back.normals() - normals, axis=1).max(), 5e-3)
         self.assertAlmostEqual(report["volume_after_mm3"] / double["volume_after_mm3"], 1, delta=1e-3)
 
     def test_a_ball_of_voxels_shrinks_by_the_formula(self):
         """From an image to the unloaded organ: the volume by the formula of the sphere whose voxels were imaged."""
-        def tool(name, *arguments):
-            report = self.path(name + ".json")
-            subprocess.run([os.path.join(os.environ["TUNICA_BIN"], "tunica-" + name), *arguments, "--quiet", "--report", report],
-                           cwd=self.folder, check=True)
-            with open(report, encoding="utf-8") as file:
-                return json.load(file)["result"]
+        def tool(*words):
+            return run_tool(*words, folder=self.folder).report["result"]
 
         tool("phantom", "sphere", "ball.nii.gz", "--size", "48", "--spacing", "0.5")
         imaged = tool("extract", "ball.nii.gz", "surface.ply", "--label", "1", "--smooth", "staircase")["volume_mm3"]
@@ -114,7 +100,7 @@ class Unloaded(SimulateTest):
     def test_beyond_the_limit_load_there_is_none(self):
         write_ply(self.path("image.ply"), *sphere(1, 10))
         pressure = 0.6 * 2 * YOUNG * 0.2 / (10 * (1 - POISSON))  # a sphere has no more than .5
-        self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions", expect=4)
+        self.imaged("image.ply", pressure, "--thickness", "0.2mm", "--fix", "rigid-motions", code=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
         self.assertIn("times the pressure imaged_at: ", self.done.stderr)
         self.assertIn("take more shells", self.done.stderr)
@@ -128,8 +114,7 @@ class Unloaded(SimulateTest):
         used, upper = np.unique(upper, return_inverse=True)
         write_ply(self.path("image.ply"), points[used], upper.reshape(-1, 3), normals[used])
         self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "0MPa", "--imaged-at", "1kPa", "--thickness", "0.2mm", "--fix",
-                      "rigid-motions", "--unloaded", "unloaded.ply", expect=3)
-        self.assertIn("hold it by a", self.done.stderr)
+                      "rigid-motions", "--unloaded", "unloaded.ply", code=3, says="hold it by a")
 
     def test_an_oval_that_flattens_is_doubted(self):
         """An oval ball becomes flatter without its pressure: a section loses more than half of its roundness."""
@@ -145,7 +130,7 @@ class Unloaded(SimulateTest):
             self.assertEqual(rounded["unloaded"] < 0.5 * rounded["image"], is_doubtful, rounded)
             self.assertEqual("unloaded shape is doubtful" in " ".join(report["warnings"]), is_doubtful)
 
-    def test_unloading_alone(self):
+    def test_unloading_needs_no_other_pressure(self):
         write_ply(self.path("image.ply"), *sphere(2, 10))
         pressure = 0.1 * 2 * YOUNG * 0.2 / (10 * (1 - POISSON))
         report = self.run_tool("image.ply", "out.hdf", *WALL, "--pressure", "0MPa", "--imaged-at", f"{pressure!r}MPa", "--thickness",
@@ -158,7 +143,7 @@ class Unloaded(SimulateTest):
         """Under an outer pressure well above the classical one."""
         write_ply(self.path("image.ply"), *sphere(2, 10))
         classical = 2 * YOUNG / math.sqrt(3 * (1 - POISSON**2)) * (0.1 / 10)**2
-        self.imaged("image.ply", -4 * classical, "--thickness", "0.1mm", "--fix", "rigid-motions", expect=4)
+        self.imaged("image.ply", -4 * classical, "--thickness", "0.1mm", "--fix", "rigid-motions", code=4)
         self.assertIn("no unloaded shape was found", self.done.stderr)
 
     def test_an_image_beyond_the_snap_is_refused(self):
@@ -175,7 +160,7 @@ class Unloaded(SimulateTest):
         held = ("--thickness", "0.1mm", "--fix", "boundary")
         unloaded = self.imaged("image.ply", 2 * one_thickness, *held)["result"]["unloaded"]
         self.assertLess(unloaded["distance_mm"]["max"], 1e-3 * thickness)
-        self.imaged("image.ply", 6 * one_thickness, *held, expect=4)
+        self.imaged("image.ply", 6 * one_thickness, *held, code=4)
         self.assertIn("the pressure leads to another state of rest", self.done.stderr)
 
     def test_a_wall_that_folds_on_the_way_is_refused(self):
@@ -184,23 +169,21 @@ class Unloaded(SimulateTest):
         flat = np.array([3, 1, 0.3])
         normals = np.array(normals) / flat
         write_ply(self.path("image.ply"), vertices * flat, triangles, normals / np.linalg.norm(normals, axis=1)[:, None])
-        self.imaged("image.ply", 0.2, "--thickness", "0.5mm", "--fix", "rigid-motions", expect=4)
+        self.imaged("image.ply", 0.2, "--thickness", "0.5mm", "--fix", "rigid-motions", code=4)
         self.assertIn("on the way to it the wall folds (image.ply: shell: triangle ", self.done.stderr)
         self.assertNotIn("tunica-relax", self.done.stderr.splitlines()[-1], "another mesh would fold as well")
 
-    def test_misuse(self):
+    def test_wrong_usage_is_2(self):
         write_ply(self.path("image.ply"), *sphere(1, 10))
         held = ("--thickness", "0.2mm", "--fix", "rigid-motions", "--pressure", "1kPa")
-        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--unloaded", "u.ply", expect=2)
-        self.assertIn("--unloaded belongs to --imaged-at", self.done.stderr)
-        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "5", expect=2)
+        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--unloaded", "u.ply", code=2,
+                      says="--unloaded belongs to --imaged-at")
+        self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "5", code=2)
         self.run_tool("image.ply", "out.hdf", *WALL, *held, "--imaged-at", "1kPa", "--accuracy", "5%", "--target", "image.ply",
-                      "--unloaded", "u.ply", expect=2)
-        self.assertIn("an unloaded shape and an accuracy", self.done.stderr)
+                      "--unloaded", "u.ply", code=2, says="an unloaded shape and an accuracy")
         self.write("scene.toml", run_lines(kind="static") + shell("image.ply", 0.2, YOUNG, POISSON) +
                    load("gravity", [0.0, 0.0, -1.0], "m/s2", more='imaged_at = "1kPa"\n'))
-        self.run_tool("--scene", "scene.toml", "out.hdf", expect=3)
-        self.assertIn("imaged_at belongs to a pressure", self.done.stderr)
+        self.run_tool("--scene", "scene.toml", "out.hdf", code=3, says="imaged_at belongs to a pressure")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tunica/io/result/detail/quadratic_shells.hpp"
+#include "tunica/mechanics/model/quadratic_shells.hpp"
 
 #include <string>
 
@@ -11,6 +11,10 @@ std::string inp_text(const Model& model, const QuadraticShells& shells, const St
                      const std::string& made_by);
 std::string feb_text(const Model& model, const QuadraticShells& shells, const StaticRun& run,
                      const std::string& made_by);
+
+/// A number as these files hold it, to 13 digits: CalculiX reads the first 20 characters, and more would lose the
+/// exponent.
+std::string deck_number(double value);
 
 /// What the loads are multiplied by at the end.
 inline double last_factor(const StaticRun& run) { return run.load_factors.empty() ? 1 : run.load_factors.back(); }

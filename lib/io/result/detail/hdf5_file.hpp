@@ -33,9 +33,6 @@ private:
   Id id_ = -1;
 };
 
-/// A file to be read, without locking it. Negative where it is no HDF5 file.
-[[nodiscard]] Handle opened_for_reading(const std::filesystem::path& path);
-
 /// Writes one file. Every failure is an OutputError that names the file, but for lack of memory: std::bad_alloc.
 class Writer {
 public:

@@ -23,6 +23,25 @@ std::optional<std::size_t> rigid_index(const Scene& scene, std::string_view name
 /// The party of a contact. Errors: as Place::fail(): there is none of that name.
 ContactParty party_named(const Scene& scene, const std::string& name, const Place& place);
 
+/// Calls visit(item, where) for all that say where, if they do.
+template <typename Visit>
+void for_each_where(const Scene& scene, const Visit& visit) {
+  const auto each = [&](const auto& items) {
+    for (const auto& item : items) {
+      visit(item, std::optional<Selection>(item.where));
+    }
+  };
+  each(scene.fixes);
+  each(scene.supports);
+  each(scene.loads);
+  each(scene.attachments);
+}
+
+/// Whether there is nothing but shells.
+inline bool is_of_shells_alone(const Scene& scene) {
+  return scene.solids.empty() && scene.rigids.empty() && scene.attachments.empty() && scene.contacts.empty();
+}
+
 /// Whether a body is one of tetrahedra.
 inline bool is_solid(const Scene& scene, std::size_t body) { return body >= scene.shells.size(); }
 

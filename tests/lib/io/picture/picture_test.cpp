@@ -76,7 +76,7 @@ const Area bar{1432, 250, 34, 570};
 const Pixel ring{13, 89, 191};
 const Pixel white{255, 255, 255};
 
-TEST(Picture, is_a_png_of_the_promised_size_with_both_views_and_the_bar) {
+TEST(Picture, IsAPngOfThePromisedSizeWithBothViewsAndTheBar) {
   const TriangleMesh sphere = make_sphere(20, 4);
   const Image image = picture(sphere, bump(sphere, {1, 2, 0.5}), {.title = "A sphere", .diagonal = 69.3});
   ASSERT_EQ(image.width, 1600);
@@ -88,7 +88,7 @@ TEST(Picture, is_a_png_of_the_promised_size_with_both_views_and_the_bar) {
   EXPECT_GT(count_near(image, {0, 840, 400, 60}, {25, 25, 25}, 60), 200) << "no scale of lengths";
 }
 
-TEST(Picture, bar_gets_darker_from_zero_to_the_largest_value_and_ends_at_a_round_number) {
+TEST(Picture, BarGetsDarkerFromZeroToTheLargestValueAndEndsAtARoundNumber) {
   const TriangleMesh sphere = make_sphere(20, 4);
   const Image image = picture(sphere, bump(sphere, {1, -2, 0.5}));
   int before = 766;
@@ -105,7 +105,7 @@ TEST(Picture, bar_gets_darker_from_zero_to_the_largest_value_and_ends_at_a_round
   EXPECT_GT(count_near(image, right_view, bottom, 60), 5000) << "small values are not light";
 }
 
-TEST(Picture, a_range_makes_the_colours_of_two_pictures_the_same) {
+TEST(Picture, ARangeMakesTheColoursOfTwoPicturesTheSame) {
   const TriangleMesh sphere = make_sphere(20, 4);
   std::vector<double> small = bump(sphere, {0, -1, 0});
   std::vector<double> large = small;
@@ -130,7 +130,7 @@ TEST(Picture, a_range_makes_the_colours_of_two_pictures_the_same) {
   EXPECT_GT(count_near(picture(sphere, small, {.maximum = 1}), above_bar, {88, 27, 110}, 10), 100);
 }
 
-TEST(Picture, front_is_left_and_back_right_whatever_the_values) {
+TEST(Picture, FrontIsLeftAndBackRightWhateverTheValues) {
   const TriangleMesh sphere = make_sphere(20, 4);
   for (const auto& [side, front] :
        {std::pair{Vec3(0, -1, 0), true}, {Vec3(0, 1, 0), false}, {Vec3(0.3, -1, 0.2), true}}) {
@@ -140,7 +140,7 @@ TEST(Picture, front_is_left_and_back_right_whatever_the_values) {
   }
 }
 
-TEST(Picture, a_surface_along_the_view_is_seen_from_another_side) {
+TEST(Picture, ASurfaceAlongTheViewIsSeenFromAnotherSide) {
   TriangleMesh rod = make_sphere(20, 4);
   for (Vec3& vertex : rod.vertices) {
     vertex.y() *= 5;
@@ -154,7 +154,7 @@ TEST(Picture, a_surface_along_the_view_is_seen_from_another_side) {
   EXPECT_GT(columns, 1000);
 }
 
-TEST(Picture, other_bodies_are_grey_and_drawn_from_outside_only) {
+TEST(Picture, OtherBodiesAreGreyAndDrawnFromOutsideOnly) {
   const TriangleMesh sphere = make_sphere(20, 4);
   TriangleMesh wall;
   append_square(wall, 60, -40);  // in front, and it faces the front view
@@ -164,7 +164,7 @@ TEST(Picture, other_bodies_are_grey_and_drawn_from_outside_only) {
   EXPECT_GT(count_near(image, right_view, {243, 235, 219}, 60), 5000) << "seen from behind, the wall hides the sphere";
 }
 
-TEST(Picture, outline_of_another_shape_is_drawn_over_the_surface) {
+TEST(Picture, OutlineOfAnotherShapeIsDrawnOverTheSurface) {
   const TriangleMesh sphere = make_sphere(20, 4);
   PictureOptions options{.outline = make_sphere(10, 4), .outline_name = "unloaded"};
   const Image with = picture(sphere, {}, options);
@@ -181,7 +181,7 @@ TEST(Picture, outline_of_another_shape_is_drawn_over_the_surface) {
   EXPECT_LT(differ, 5000);
 }
 
-TEST(Canvas, text_is_measured_as_it_is_drawn_in_any_of_its_scripts) {
+TEST(Canvas, TextIsMeasuredAsItIsDrawnInAnyOfItsScripts) {
   for (const std::string text : {"Hausdorff", "Größe", "μήκος", "толщина", "10 − 5 ≤ 7 µm²"}) {
     Canvas canvas(600, 100);
     canvas.text(text, 50, 60, 40, {0, 0, 0});
@@ -199,7 +199,7 @@ TEST(Canvas, text_is_measured_as_it_is_drawn_in_any_of_its_scripts) {
   }
 }
 
-TEST(Picture, faces_that_point_inward_look_the_same) {
+TEST(Picture, FacesThatPointInwardLookTheSame) {
   const TriangleMesh sphere = make_sphere(20, 3);
   TriangleMesh inward = sphere;
   for (auto& triangle : inward.triangles) {
@@ -214,7 +214,7 @@ TEST(Picture, faces_that_point_inward_look_the_same) {
   EXPECT_LT(difference / real(a.bytes.size()), 0.2);
 }
 
-TEST(Picture, same_bytes_whatever_the_number_of_threads) {
+TEST(Picture, SameBytesWhateverTheNumberOfThreads) {
   const TriangleMesh sphere = make_sphere(20, 5);
   PictureOptions options{.title = "a", .diagonal = 60};
   set_thread_count(1);
@@ -225,7 +225,7 @@ TEST(Picture, same_bytes_whatever_the_number_of_threads) {
   EXPECT_EQ(one, four);
 }
 
-TEST(Picture, values_without_a_range_or_without_a_number_are_drawn) {
+TEST(Picture, ValuesWithoutARangeOrWithoutANumberAreDrawn) {
   const TriangleMesh box = make_box();
   EXPECT_NO_THROW(picture(box, std::vector<double>(8, 0), {.diagonal = 3.4}));
   EXPECT_NO_THROW(picture(box, std::vector<double>(8, std::nan("")), {.diagonal = 3.4}));
@@ -236,7 +236,7 @@ TEST(Picture, values_without_a_range_or_without_a_number_are_drawn) {
   EXPECT_NO_THROW(picture(box, infinite));
 }
 
-TEST(Picture, surface_without_extent_or_of_one_triangle_is_drawn) {
+TEST(Picture, SurfaceWithoutExtentOrOfOneTriangleIsDrawn) {
   TriangleMesh point;
   point.vertices = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3}};
   point.triangles = {{0, 1, 2}};
@@ -267,7 +267,7 @@ Area covered(const Image& image) {
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
-TEST(Thumbnail, the_organ_stands_as_in_the_picture_and_fills_the_longer_side) {
+TEST(Thumbnail, TheOrganStandsAsInThePictureAndFillsTheLongerSide) {
   TriangleMesh rod = make_sphere(20, 3);
   for (Vec3& vertex : rod.vertices) {
     vertex.z() *= 3;
@@ -288,7 +288,7 @@ TEST(Thumbnail, the_organ_stands_as_in_the_picture_and_fills_the_longer_side) {
   EXPECT_EQ(small().width, 120);
 }
 
-TEST(Thumbnail, surface_without_extent_is_drawn) {
+TEST(Thumbnail, SurfaceWithoutExtentIsDrawn) {
   TriangleMesh point;
   point.vertices = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3}};
   point.triangles = {{0, 1, 2}};
@@ -297,7 +297,7 @@ TEST(Thumbnail, surface_without_extent_is_drawn) {
   EXPECT_EQ(read_png(thumbnail(point, {0, 1, 2}, {.longest = 120, .top = 2}), PNG_FORMAT_RGBA).width, 120);
 }
 
-TEST(Picture, title_of_any_bytes_and_any_length_leaves_the_picture_whole) {
+TEST(Picture, TitleOfAnyBytesAndAnyLengthLeavesThePictureWhole) {
   const TriangleMesh box = make_box();
   const std::string odd = "\xff\xfeé 漢字\n\t%s{}";
   const Image image = picture(box, std::vector<double>(8, 1),
@@ -305,7 +305,7 @@ TEST(Picture, title_of_any_bytes_and_any_length_leaves_the_picture_whole) {
   EXPECT_GT(count_near(image, {1580, 0, 20, 900}, white, 3), 20 * 900 - 10) << "the text runs out of the picture";
 }
 
-TEST(Picture, lines_are_hidden_behind_the_surface) {
+TEST(Picture, LinesAreHiddenBehindTheSurface) {
   const TriangleMesh box = make_box();
   PictureOptions options;
   const auto dark_pixels = [&] {

@@ -29,7 +29,7 @@ bool same_floats(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
-TEST(Rasteriser, sphere_covers_its_disc_without_cracks_at_its_depth) {
+TEST(Rasteriser, SphereCoversItsDiscWithoutCracksAtItsDepth) {
   const double radius = 10;
   const TriangleMesh sphere = make_sphere(radius, 5);
   const Camera camera = front_camera(240, 10);
@@ -50,7 +50,7 @@ TEST(Rasteriser, sphere_covers_its_disc_without_cracks_at_its_depth) {
   EXPECT_NEAR(covered / (pi * radius * radius * camera.scale * camera.scale), 1, 0.01);
 }
 
-TEST(Rasteriser, nearer_surface_hides_farther_whatever_the_order) {
+TEST(Rasteriser, NearerSurfaceHidesFartherWhateverTheOrder) {
   for (const bool nearer_first : {true, false}) {
     TriangleMesh mesh;
     const double first = nearer_first ? -1 : 1;  // the camera looks along +y: smaller y is nearer
@@ -64,7 +64,7 @@ TEST(Rasteriser, nearer_surface_hides_farther_whatever_the_order) {
   }
 }
 
-TEST(Rasteriser, value_of_a_plane_is_linear) {
+TEST(Rasteriser, ValueOfAPlaneIsLinear) {
   TriangleMesh mesh;
   append_square(mesh, 5, 0);
   std::vector<double> values;
@@ -80,7 +80,7 @@ TEST(Rasteriser, value_of_a_plane_is_linear) {
   }
 }
 
-TEST(Rasteriser, back_of_a_triangle_is_inner_and_lit_like_its_front) {
+TEST(Rasteriser, BackOfATriangleIsInnerAndLitLikeItsFront) {
   TriangleMesh front;
   append_square(front, 5, 0);
   TriangleMesh back = front;
@@ -93,7 +93,7 @@ TEST(Rasteriser, back_of_a_triangle_is_inner_and_lit_like_its_front) {
   EXPECT_FLOAT_EQ(a.light[a.at(32, 32)], b.light[b.at(32, 32)]);
 }
 
-TEST(Rasteriser, degenerate_and_far_away_triangles_draw_nothing_and_do_not_crash) {
+TEST(Rasteriser, DegenerateAndFarAwayTrianglesDrawNothingAndDoNotCrash) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {0, 0, 0}, {1, 0, 1}, {1e12, 0, 1e12}, {-1e12, 0, 2e12}, {3e12, 5, 1e12}};
   mesh.triangles = {{0, 1, 2}, {0, 0, 0}, {3, 4, 5}};
@@ -101,14 +101,14 @@ TEST(Rasteriser, degenerate_and_far_away_triangles_draw_nothing_and_do_not_crash
   EXPECT_TRUE(std::ranges::all_of(raster.depth, [](float depth) { return depth == Raster::empty; }));
 }
 
-TEST(Rasteriser, triangle_much_larger_than_the_picture_fills_it) {
+TEST(Rasteriser, TriangleMuchLargerThanThePictureFillsIt) {
   TriangleMesh mesh;
   append_square(mesh, 1e7, 0);
   const Raster raster = draw(mesh, front_camera(32, 1));
   EXPECT_TRUE(std::ranges::none_of(raster.depth, [](float depth) { return depth == Raster::empty; }));
 }
 
-TEST(Rasteriser, value_that_is_not_finite_spoils_its_triangles_only) {
+TEST(Rasteriser, ValueThatIsNotFiniteSpoilsItsTrianglesOnly) {
   TriangleMesh mesh = make_sphere(10, 3);
   std::vector<double> values(mesh.vertices.size(), 1);
   values[0] = std::nan("");
@@ -118,7 +118,7 @@ TEST(Rasteriser, value_that_is_not_finite_spoils_its_triangles_only) {
   EXPECT_GT(std::ranges::count(raster.value, 1.0f), 4000);
 }
 
-TEST(Rasteriser, does_not_depend_on_the_number_of_threads) {
+TEST(Rasteriser, DoesNotDependOnTheNumberOfThreads) {
   const TriangleMesh sphere = make_sphere(10, 5);
   std::vector<double> values;
   for (const Vec3& p : sphere.vertices) {
@@ -134,7 +134,7 @@ TEST(Rasteriser, does_not_depend_on_the_number_of_threads) {
   EXPECT_TRUE(same_floats(one.light, five.light));
 }
 
-TEST(ShadingNormals, follow_a_smooth_surface_and_keep_an_edge) {
+TEST(ShadingNormals, FollowASmoothSurfaceAndKeepAnEdge) {
   const TriangleMesh sphere = make_sphere(3, 4);
   const auto smooth = shading_normals(sphere);
   for (std::size_t t = 0; t < sphere.triangles.size(); ++t) {

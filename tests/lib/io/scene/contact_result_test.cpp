@@ -2,7 +2,9 @@
 #include "scene_fixture.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/io/file/output_file.hpp"
+#include "tunica/io/result/page_file.hpp"
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"
 #include "tunica/io/result/run_journal.hpp"
@@ -81,10 +83,19 @@ protected:
     return result;
   }
 
+  /// A run of which the file holds the last state, or all.
+  static RunSettings run_of(bool series) {
+    RunSettings run;
+    if (series) {
+      run.kind = DynamicRun();
+    }
+    return run;
+  }
+
   /// Writes the reference and two states.
   void write(bool series) {
     ResultOptions options;
-    options.series = series;
+    options.run = run_of(series);
     options.overwrite = true;
     ResultFile file(out(), model_, options);
     for (const double time : {0.0, 0.5, 1.0}) {
@@ -93,13 +104,20 @@ protected:
     file.commit(true);
   }
 
-  [[nodiscard]] Json report(bool dynamic) const {
-    Json result;
-    prepare_result(result, model_);
-    for (const double time : {0.0, 0.5, 1.0}) {
-      report_state(result, model_, state(time, Vec3(time, 0, 0)), fields(time), dynamic);
+  [[nodiscard]] RunRecord begun(bool dynamic) const {
+    RunSettings run;
+    if (dynamic) {
+      run.kind = DynamicRun();
     }
-    return result;
+    return RunRecord(model_, run);
+  }
+
+  [[nodiscard]] Json report(bool dynamic) const {
+    RunRecord record = begun(dynamic);
+    for (const double time : {0.0, 0.5, 1.0}) {
+      record.take(model_, state(time, Vec3(time, 0, 0)), fields(time));
+    }
+    return run_report(record);
   }
 
   [[nodiscard]] fs::path out() const { return folder_ / "out.hdf"; }
@@ -116,7 +134,55 @@ std::vector<double> last(const std::vector<double>& list, std::size_t count) {
   return {list.end() - static_cast<std::ptrdiff_t>(count), list.end()};
 }
 
-TEST_F(ContactResult, tetrahedraFollowTheShells) {
+TEST_F(ContactResult, APageHasEveryStateOfShellsAndOuterFaces) {
+  for (const bool series : {false, true}) {
+    write(series);
+    const DrawnResult drawn = read_page_file(page_path(out()));
+    EXPECT_EQ(drawn.kind, series ? DrawnResult::Kind::motion : DrawnResult::Kind::statics);
+    EXPECT_FALSE(drawn.is_unloaded);
+    EXPECT_THAT(
+        (std::array{drawn.shells, drawn.pieces, drawn.reference.vertices.size(), drawn.reference.triangles.size(),
+                    drawn.solids.vertices.size(), drawn.solids.triangles.size(), drawn.states.size()}),
+        ElementsAre(8, 4, drawn_points, drawn_triangles, 5, 6, 3));
+    for (std::size_t i = 0; i < drawn.states.size(); ++i) {
+      const DrawnResult::State& state = drawn.states[i];
+      const double time = 0.5 * real(i);
+      EXPECT_THAT((std::array{real(state.number), state.time, state.load_factor}), ElementsAre(real(i), time, time));
+      EXPECT_LT((state.displacement.back() - Vec3(time, 0, 0)).norm(), 1e-6);
+      EXPECT_EQ(state.of_solids.back(), Vec3(time, 0, 0));
+      EXPECT_THAT((std::array{state.membrane.back(), state.von_mises.back()}), ElementsAre(time, time));
+    }
+  }
+}
+
+TEST_F(ContactResult, APageHasTheFirstAndTheLastOfManyStates) {
+  ResultOptions options;
+  options.run = run_of(true);
+  options.is_unloaded = true;
+  options.scene = "[run]\nmesh = \"\xff\"\n";
+  options.tessellation = 1;
+  options.overwrite = true;
+  ResultFile file(out(), model_, options);
+  constexpr std::size_t count = 200;
+  for (std::size_t i = 0; i < count; ++i) {
+    file.append(state(real(i), Vec3::Zero()), fields(1));
+  }
+  EXPECT_FALSE(fs::exists(page_path(out())));
+  file.commit(true);
+  const DrawnResult drawn = read_page_file(page_path(out()));
+  EXPECT_TRUE(drawn.is_unloaded);
+  EXPECT_EQ(drawn.scene, "[run]\nmesh = \"\xef\xbf\xbd\"\n");
+  EXPECT_EQ(drawn.pieces, 4) << "whatever the result is cut into";
+  ASSERT_EQ(drawn.states.size(), most_page_states);
+  EXPECT_EQ(drawn.states.front().number, 0);
+  EXPECT_EQ(drawn.states.back().number, count - 1);
+  for (std::size_t i = 1; i < drawn.states.size(); ++i) {
+    const std::size_t step = drawn.states[i].number - drawn.states[i - 1].number;
+    EXPECT_TRUE(step >= 3 && step <= 8) << step;
+  }
+}
+
+TEST_F(ContactResult, TetrahedraFollowTheShells) {
   for (const bool series : {false, true}) {
     write(series);
     const std::size_t states = series ? 3 : 1;
@@ -155,7 +221,7 @@ TEST_F(ContactResult, tetrahedraFollowTheShells) {
   }
 }
 
-TEST_F(ContactResult, solidsNeedNoShells) {
+TEST_F(ContactResult, SolidsNeedNoShells) {
   model_.shells.clear();
   model_.contacts.clear();
   model_.rigids.clear();
@@ -175,7 +241,7 @@ TEST_F(ContactResult, solidsNeedNoShells) {
   EXPECT_TRUE(result["wall"].is_null());
 }
 
-TEST_F(ContactResult, contactsAreWrittenStateByState) {
+TEST_F(ContactResult, ContactsAreWrittenStateByState) {
   write(false);
   EXPECT_THAT(last(read("/tunica/contacts/grip/force"), 6), ElementsAre(1, 0.5, 0, 1, 1, 0));
   EXPECT_THAT(last(read("/tunica/contacts/push/moment"), 6), ElementsAre(0, 2, 0.5, 0, 2, 1));
@@ -194,7 +260,7 @@ TEST_F(ContactResult, contactsAreWrittenStateByState) {
   EXPECT_TRUE(std::isnan(read("/tunica/rigid/tool/position").front()));
 }
 
-TEST_F(ContactResult, contactsAreReported) {
+TEST_F(ContactResult, ContactsAreReported) {
   const Json result = report(false);
   EXPECT_EQ(result["shells"], 8);
   EXPECT_EQ(result["tetrahedra"], 2);
@@ -218,20 +284,20 @@ TEST_F(ContactResult, contactsAreReported) {
   EXPECT_EQ(report(true)["contacts"]["grip"]["time_s"].dump(), "[0.5,1.0]");
 }
 
-TEST_F(ContactResult, whatAStateDoesNotSayHasNoValue) {
-  Json result;
-  prepare_result(result, model_);
+TEST_F(ContactResult, WhatAStateDoesNotSayHasNoValue) {
+  RunRecord record = begun(true);
   State silent = state(1, Vec3::Zero());
   silent.contacts.clear();
   silent.rigids.clear();
-  report_state(result, model_, silent, fields(1), true);
+  record.take(model_, silent, fields(1));
+  const Json result = run_report(record);
   EXPECT_EQ(result["contacts"]["grip"]["force_n"].dump(), "[[null,null,null]]");
   EXPECT_EQ(result["contacts"]["grip"]["smallest_gap_mm"].dump(), R"([{"lower":null,"upper":null}])");
   EXPECT_EQ(result["rigid"]["tool"]["position_mm"].dump(), "[[null,null,null]]");
   EXPECT_TRUE(result["balance"]["force"].is_null());
 }
 
-TEST_F(ContactResult, shellsAloneShowNothingOfIt) {
+TEST_F(ContactResult, ShellsAloneShowNothingOfIt) {
   model_.solids.clear();
   model_.rigids.clear();
   model_.contacts.clear();
@@ -251,16 +317,16 @@ TEST_F(ContactResult, shellsAloneShowNothingOfIt) {
   }
 }
 
-TEST_F(ContactResult, stressesBeyondSinglePrecisionAreRefused) {
+TEST_F(ContactResult, StressesBeyondSinglePrecisionAreRefused) {
   ResultFile file(out(), model_, {});
   ElementFields huge = fields(1);
   huge.solid_pressure[1] = 1e39;
   EXPECT_THROW(file.append(state(1, Vec3::Zero()), huge), RequirementError);
 }
 
-TEST_F(ContactResult, exportsHoldBoth) {
+TEST_F(ContactResult, ExportsHoldBoth) {
   for (const bool series : {false, true}) {
-    ResultExport files(out(), model_, {.pvd = true, .xmf = true, .series = series, .overwrite = true});
+    ResultExport files(out(), model_, {.pvd = true, .xmf = true, .run = run_of(series), .overwrite = true});
     for (const double time : {0.0, 1.0}) {
       EXPECT_TRUE(files.append(state(time, Vec3(time, 0, 0)), fields(time)));
     }
@@ -276,7 +342,7 @@ TEST_F(ContactResult, exportsHoldBoth) {
   }
 }
 
-TEST_F(ContactResult, aResumedRunKnowsItsContacts) {
+TEST_F(ContactResult, AResumedRunKnowsItsContacts) {
   const fs::path part = part_of(out());
   {
     RunJournal journal = RunJournal::create(part, {});
@@ -292,11 +358,10 @@ TEST_F(ContactResult, aResumedRunKnowsItsContacts) {
     });
     journal.append(state(2, Vec3::Zero()));  // after the checkpoint: forgotten
   }
-  Json result;
-  prepare_result(result, model_);
-  const auto report_it = [&](const State& state) { report_state(result, model_, state, fields(state.time), false); };
+  RunRecord record = begun(false);
+  const auto report_it = [&](const State& state) { record.take(model_, state, fields(state.time)); };
   EXPECT_TRUE(RunJournal::open(part).replay(model_, report_it));
-  EXPECT_EQ(result, report(false));
+  EXPECT_EQ(run_report(record), report(false));
   model_.contacts.pop_back();
   EXPECT_THROW((void)RunJournal::open(part).replay(model_, [](const State&) {}), InputError);
 }

@@ -2,9 +2,9 @@
 #include "scene_fixture.hpp"
 
 #include "tunica/core/error.hpp"
-#include "tunica/io/result/detail/result_grid.hpp"
 #include "tunica/io/result/result_file.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/result_grid.hpp"
 
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
@@ -95,7 +95,7 @@ nearest = ["10mm", "10mm", "0mm"]
   ResultOptions options_;
 };
 
-TEST_F(ResultTest, rigidMotionMovesTheCurvedSurfaceRigidly) {
+TEST_F(ResultTest, RigidMotionMovesTheCurvedSurfaceRigidly) {
   const Vec3 rotation = 2.5 * Vec3(1, -2, 0.5).normalized();
   const Vec3 centre(3, 1, -7);
   const Vec3 shift(100, 0, 4);
@@ -112,7 +112,7 @@ TEST_F(ResultTest, rigidMotionMovesTheCurvedSurfaceRigidly) {
   }
 }
 
-TEST_F(ResultTest, aNormalTurnedIntoItsFacetStillGivesADisplacement) {
+TEST_F(ResultTest, ANormalTurnedIntoItsFacetStillGivesADisplacement) {
   State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3(0, 0, 1));
   state.rotation[0] = Vec3(0, std::numbers::pi / 2, 0);
   const Tessellation surface = tessellate_uniformly(model_.shells[0].mesh, 2);
@@ -122,7 +122,7 @@ TEST_F(ResultTest, aNormalTurnedIntoItsFacetStillGivesADisplacement) {
   }
 }
 
-TEST_F(ResultTest, inflationScalesTheCurvedSurface) {
+TEST_F(ResultTest, InflationScalesTheCurvedSurface) {
   const double stretch = 1.4;
   State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
   for (std::size_t body = 0; body < model_.shells.size(); ++body) {
@@ -138,7 +138,7 @@ TEST_F(ResultTest, inflationScalesTheCurvedSurface) {
   }
 }
 
-TEST_F(ResultTest, watertightShellsStayWatertightWhateverTheyDo) {
+TEST_F(ResultTest, WatertightShellsStayWatertightWhateverTheyDo) {
   model_.shells[0].mesh.patch = Patch::watertight;
   const ShellMesh& mesh = model_.shells[0].mesh;
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
@@ -178,7 +178,7 @@ TEST_F(ResultTest, watertightShellsStayWatertightWhateverTheyDo) {
   }
 }
 
-TEST_F(ResultTest, aSmallRotationOfOneNodeMovesLinearAndFiniteSurfacesAlike) {
+TEST_F(ResultTest, ASmallRotationOfOneNodeMovesLinearAndFiniteSurfacesAlike) {
   const double angle = 1e-5;
   State finite = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
   finite.rotation[0] = angle * Vec3(1, 0.5, -0.2);
@@ -197,7 +197,7 @@ TEST_F(ResultTest, aSmallRotationOfOneNodeMovesLinearAndFiniteSurfacesAlike) {
 }
 
 // A cubic whose end slopes differ by s over a length L rises by 4/27 s L at most, and both ends of an edge may turn.
-TEST_F(ResultTest, aFarTurnedNodeMakesNoSpike) {
+TEST_F(ResultTest, AFarTurnedNodeMakesNoSpike) {
   State state = moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
   const ShellMesh& mesh = model_.shells[0].mesh;
   const double angle = 1.4;
@@ -215,9 +215,9 @@ TEST_F(ResultTest, aFarTurnedNodeMakesNoSpike) {
   }
 }
 
-TEST_F(ResultTest, aSeriesGrowsAndASingleStateIsReplaced) {
+TEST_F(ResultTest, ASeriesGrowsAndASingleStateIsReplaced) {
   for (const bool series : {false, true}) {
-    options_.series = series;
+    options_.run.kind = series ? decltype(RunSettings::kind)(DynamicRun()) : StaticRun();
     options_.overwrite = true;
     ResultFile file(out(), model_, options_);
     file.append(moved(Vec3::Zero(), Vec3::Zero(), Vec3::Zero()), fields(0));
@@ -250,7 +250,7 @@ TEST_F(ResultTest, aSeriesGrowsAndASingleStateIsReplaced) {
   }
 }
 
-TEST_F(ResultTest, thePartStaysFromTheFirstStateOn) {
+TEST_F(ResultTest, ThePartStaysFromTheFirstStateOn) {
   { const ResultFile file(out(), model_, options_); }
   EXPECT_FALSE(fs::exists(part()));
   {
@@ -262,13 +262,13 @@ TEST_F(ResultTest, thePartStaysFromTheFirstStateOn) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
-TEST_F(ResultTest, anExistingResultIsKept) {
+TEST_F(ResultTest, AnExistingResultIsKept) {
   (void)folder_.file("out.hdf", "precious");
   EXPECT_THROW(ResultFile(out(), model_, options_), OutputError);
   EXPECT_EQ(bytes_of(out()), "precious");
 }
 
-TEST_F(ResultTest, largeModelsAreDrawnCoarser) {
+TEST_F(ResultTest, LargeModelsAreDrawnCoarser) {
   EXPECT_EQ(drawing_level(1), 4);
   EXPECT_EQ(drawing_level(12'500), 4);
   EXPECT_EQ(drawing_level(12'501), 3);

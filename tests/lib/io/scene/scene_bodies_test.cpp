@@ -93,7 +93,7 @@ protected:
   }
 };
 
-TEST_F(BodiesTest, solidsAreNumberedAfterTheShells) {
+TEST_F(BodiesTest, SolidsAreNumberedAfterTheShells) {
   const LoadedScene loaded = load(quasi_static + solid() + plate + solid("second") +
                                   "density = \"1g/cm3\"\nlaw = \"neo-hookean\"\nscale = 2\n");
   const Model& model = loaded.model;
@@ -111,9 +111,9 @@ TEST_F(BodiesTest, solidsAreNumberedAfterTheShells) {
   EXPECT_DOUBLE_EQ(model.solids[1].mesh.vertices[7].x(), 20);
 }
 
-TEST_F(BodiesTest, aSceneMayHaveNoShell) { EXPECT_EQ(load(quasi_static + solid()).model.body_count(), 1U); }
+TEST_F(BodiesTest, ASceneMayHaveNoShell) { EXPECT_EQ(load(quasi_static + solid()).model.body_count(), 1U); }
 
-TEST_F(BodiesTest, aSurfaceIsFilled) {
+TEST_F(BodiesTest, ASurfaceIsFilled) {
   const std::string text =
       "[[solid]]\nname = \"stuffed\"\nfill = \"ball.ply\"\nsize = \"5mm\"\nyoung = \"60kPa\"\npoisson = 0.4999\n";
   const Scene scene = read(with_plate(text));
@@ -122,7 +122,7 @@ TEST_F(BodiesTest, aSurfaceIsFilled) {
   EXPECT_FALSE(load_scene(scene).model.solids.at(0).mesh.tetrahedra.empty());
 }
 
-TEST_F(BodiesTest, selectionsLoadsAndProbesKnowSolids) {
+TEST_F(BodiesTest, SelectionsLoadsAndProbesKnowSolids) {
   const LoadedScene loaded = load(with_solid(
       "density = \"1g/cm3\"\n" + fix("cube", "{below = {axis = \"z\", at = \"0mm\"}}") +
       fix("cube", "{nodes = [7]}", "rotation = \"\"\ndisplacement = [\"0mm\", \"0mm\", \"1mm\"]\n") +
@@ -143,7 +143,7 @@ TEST_F(BodiesTest, selectionsLoadsAndProbesKnowSolids) {
   EXPECT_EQ(model.probes.at(0).node, 7U);
 }
 
-TEST_F(BodiesTest, everyShapeOfARigidBodyArrives) {
+TEST_F(BodiesTest, EveryShapeOfARigidBodyArrives) {
   const std::string moving =
       "[run]\nkind = \"dynamic\"\nduration = \"1s\"\nstep = \"10ms\"\n" + std::string(plate) + "density = \"1g/cm3\"\n";
   const std::string turning =
@@ -200,7 +200,7 @@ TEST_F(BodiesTest, everyShapeOfARigidBodyArrives) {
   EXPECT_EQ(model.rigids[4].name, "stent");
 }
 
-TEST_F(BodiesTest, inAStaticRunTablesAreOverTheLoadFactor) {
+TEST_F(BodiesTest, InAStaticRunTablesAreOverTheLoadFactor) {
   const Scene scene = read(with_plate(rigid("sphere",
                                             "centre = [[0.0, [\"0mm\", \"0mm\", \"9mm\"]], [1.0, [\"0mm\", \"0mm\", "
                                             "\"8mm\"]]]\nradius = [[\"0s\", \"1mm\"], [\"1s\", \"3mm\"]]") +
@@ -212,7 +212,7 @@ TEST_F(BodiesTest, inAStaticRunTablesAreOverTheLoadFactor) {
   EXPECT_TRUE(again(scene).notes.empty());
 }
 
-TEST_F(BodiesTest, rigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
+TEST_F(BodiesTest, RigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
   const LoadedScene loaded =
       load(with_plate("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + sphere("idle") + contact("in", "plate")));
   const auto& surface = std::get<RigidMesh>(loaded.model.rigids.at(0).shape).surface;
@@ -224,7 +224,7 @@ TEST_F(BodiesTest, rigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
             1);
 }
 
-TEST_F(BodiesTest, contactsAreResolvedToParties) {
+TEST_F(BodiesTest, ContactsAreResolvedToParties) {
   const Scene scene = read(
       with_solid(sphere() + contact("stone", "cube", "friction = 0.2\nresolution = \"2.5%\"\nsurface = \"facets\"\n") +
                  contact("plate", "plate", "name = \"folds\"\ntransfer = \"paper\"\n") + contact("plate", "cube")));
@@ -252,7 +252,7 @@ TEST_F(BodiesTest, contactsAreResolvedToParties) {
   }
 }
 
-TEST_F(BodiesTest, touchingNodesLieOnTheChosenFace) {
+TEST_F(BodiesTest, TouchingNodesLieOnTheChosenFace) {
   const auto attached = [&](const std::string& mesh, const std::string& distance, const std::string& side) {
     try {
       const Scene scene =
@@ -276,7 +276,7 @@ TEST_F(BodiesTest, touchingNodesLieOnTheChosenFace) {
   EXPECT_EQ(attached("lifted.msh", "0.101mm", "side = \"inner\"\n"), 4U);
 }
 
-TEST_F(BodiesTest, shellsAreCarriedBySolidsAndChainsByEachOther) {
+TEST_F(BodiesTest, ShellsAreCarriedBySolidsAndChainsByEachOther) {
   const LoadedScene loaded =
       load(with_solid(attach("plate", "{touching = \"1um\"}", "cube") + solid("top", "lifted.msh") +
                       attach("cube", "{above = {axis = \"z\", at = \"10mm\"}}", "top")));
@@ -288,7 +288,7 @@ TEST_F(BodiesTest, shellsAreCarriedBySolidsAndChainsByEachOther) {
   EXPECT_THAT(attachments[1].nodes, ElementsAre(4U, 5U, 6U, 7U));
 }
 
-TEST_F(BodiesTest, touchingFollowsTheCurvedSurface) {
+TEST_F(BodiesTest, TouchingFollowsTheCurvedSurface) {
   // A corner of the cube on the sphere, half way between three corners of the octahedron: 4 mm from the facet.
   const double along = 10 / std::sqrt(3.0);
   std::string mesh = cube(0);
@@ -307,7 +307,7 @@ TEST_F(BodiesTest, touchingFollowsTheCurvedSurface) {
   EXPECT_THAT(nodes("rest = \"flat\"\n"), ElementsAre(1U, 2U, 4U));
 }
 
-TEST_F(BodiesTest, filesOfMeshesAreListedOnce) {
+TEST_F(BodiesTest, FilesOfMeshesAreListedOnce) {
   const Scene scene = read(with_solid("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + solid("again")));
   EXPECT_THAT(mesh_files(scene), ElementsAre(folder_ / "plate.ply", folder_ / "cube.msh", folder_ / "inward.ply"));
 }
@@ -327,7 +327,7 @@ protected:
   }
 };
 
-TEST_P(WrongBodies, isAnErrorWithItsPlace) { expect(ExitCode::input); }
+TEST_P(WrongBodies, IsAnErrorWithItsPlace) { expect(ExitCode::input); }
 
 std::string solid_with(const std::string& lines) {
   return with_plate("[[solid]]\nname = \"cube\"\n" + lines + "\n");  // `lines` begin in line 11
@@ -499,7 +499,7 @@ INSTANTIATE_TEST_SUITE_P(all, WrongBodies, ::testing::ValuesIn(wrong_bodies),
 
 class LaterBodies : public WrongBodies {};
 
-TEST_P(LaterBodies, saysNotAvailableYet) { expect(ExitCode::usage); }
+TEST_P(LaterBodies, SaysNotAvailableYet) { expect(ExitCode::usage); }
 
 std::string modes(const std::string& kind, const std::string& more) {
   return "[run]\nkind = \"" + kind + "\"\n" + plate + "density = \"1g/cm3\"\n" + more;  // `more` begins in line 10
@@ -533,7 +533,7 @@ const std::vector<Wrong> laters{
 INSTANTIATE_TEST_SUITE_P(all, LaterBodies, ::testing::ValuesIn(laters),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST_F(BodiesTest, damagedTextNeverCrashes) {
+TEST_F(BodiesTest, DamagedTextNeverCrashes) {
   const std::string text =
       scene_text(read(with_solid(rigid("capsule",
                                        "from = [\"0mm\", \"0mm\", \"20mm\"]\nto = [[0, [\"0mm\", \"0mm\", \"30mm\"]]]\n"

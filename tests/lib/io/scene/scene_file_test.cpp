@@ -1,7 +1,9 @@
 #include "scene_fixture.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/io/file/output_file.hpp"
 #include "tunica/io/scene/detail/toml_depth.hpp"
+#include "tunica/io/scene/scene_manual.hpp"
 
 #include <gmock/gmock.h>
 
@@ -24,7 +26,7 @@ std::string fix_where(const std::string& where) {
   return basic("[[fix]]\nbody = \"plate\"\nwhere = " + where + "\ntranslation = \"xyz\"\nrotation = \"\"\n");
 }
 
-TEST_F(SceneTest, defaultsAreThoseOfTheContract) {
+TEST_F(SceneTest, DefaultsAreThoseOfTheContract) {
   const Scene scene = read(basic());
   const auto& statics = std::get<StaticRun>(scene.run.kind);
   EXPECT_FALSE(statics.linear);
@@ -44,7 +46,7 @@ TEST_F(SceneTest, defaultsAreThoseOfTheContract) {
   EXPECT_FALSE(scene.shells[0].material.density);
 }
 
-TEST_F(SceneTest, everyKeyOfADynamicRunArrives) {
+TEST_F(SceneTest, EveryKeyOfADynamicRunArrives) {
   const Scene scene = read(
       "[run]\nkind = \"dynamic\"\ngeometry = \"nonlinear\"\nduration = \"2s\"\nstep = \"40ms\"\n"
       "damping = {mass = \"0.1/s\", stiffness = \"2ms\"}\nintegrator = \"backward-euler\"\nsolver = \"cg\"\n"
@@ -79,7 +81,7 @@ TEST_F(SceneTest, everyKeyOfADynamicRunArrives) {
   EXPECT_DOUBLE_EQ(load.ramp.at(0.75), 0.75);
 }
 
-TEST_F(SceneTest, aCountOfIterationsAloneIsAFixedCount) {
+TEST_F(SceneTest, ACountOfIterationsAloneIsAFixedCount) {
   const Scene alone = read("[run]\nkind = \"static\"\ncg_iterations = 100\n" + std::string(plate));
   EXPECT_TRUE(alone.run.cg_fixed_count);
   EXPECT_EQ(alone.run.newton_max, 1U);  // one linearisation per step
@@ -89,7 +91,7 @@ TEST_F(SceneTest, aCountOfIterationsAloneIsAFixedCount) {
   EXPECT_EQ(both.run.cg_tolerance, 1e-6);
 }
 
-TEST_F(SceneTest, loadFactorsAndLinearGeometry) {
+TEST_F(SceneTest, LoadFactorsAndLinearGeometry) {
   const Scene factors = read("[run]\nkind = \"static\"\nload_factors = [0.1, 0.5, 2]\n" + std::string(plate));
   EXPECT_THAT(std::get<StaticRun>(factors.run.kind).load_factors, ElementsAre(0.1, 0.5, 2.0));
   const Scene linear = read("[run]\nkind = \"static\"\ngeometry = \"linear\"\n" + std::string(plate));
@@ -97,7 +99,7 @@ TEST_F(SceneTest, loadFactorsAndLinearGeometry) {
   EXPECT_THAT(std::get<StaticRun>(linear.run.kind).load_factors, ElementsAre(1.0));
 }
 
-TEST_F(SceneTest, everyKindOfLoadArrives) {
+TEST_F(SceneTest, EveryKindOfLoadArrives) {
   const LoadedScene loaded = load(
       "[run]\nkind = \"static\"\n[[shell]]\nname = \"p\"\nmesh = \"plate.ply\"\nthickness = \"1mm\"\nyoung = \"1MPa\"\n"
       "poisson = 0.3\ndensity = \"1g/cm3\"\n"
@@ -125,7 +127,7 @@ TEST_F(SceneTest, everyKindOfLoadArrives) {
   EXPECT_EQ(loads[4].ramp.points.size(), 2U);
 }
 
-TEST_F(SceneTest, regionsIncludeTheirBorder) {
+TEST_F(SceneTest, RegionsIncludeTheirBorder) {
   const auto count = [&](const std::string& where) { return load(fix_where(where)).model.fixes.at(0).nodes.size(); };
   EXPECT_EQ(count("{all = true}"), 25U);
   EXPECT_EQ(count("{boundary = true}"), 16U);
@@ -140,7 +142,7 @@ TEST_F(SceneTest, regionsIncludeTheirBorder) {
   EXPECT_EQ(count(R"({above = {axis = "x", at = "7.501mm"}})"), 5U);
 }
 
-TEST_F(SceneTest, fixesHoldWhatTheySay) {
+TEST_F(SceneTest, FixesHoldWhatTheySay) {
   const LoadedScene loaded = load(basic("[[fix]]\nbody = \"plate\"\nwhere = {nodes = [7]}\ntranslation = \"zx\"\n"
                                         "rotation = \"y\"\ndisplacement = [\"1mm\", \"0mm\", \"-2mm\"]\n"
                                         "ramp = [[0, 0], [1, 2]]\n") +
@@ -155,7 +157,7 @@ TEST_F(SceneTest, fixesHoldWhatTheySay) {
   EXPECT_EQ(loaded.model.rigid_motions[0].body, 1U);
 }
 
-TEST_F(SceneTest, bedsAndSlidesHoldAndLeaveTheRestToRigidMotions) {
+TEST_F(SceneTest, BedsAndSlidesHoldAndLeaveTheRestToRigidMotions) {
   const Scene scene =
       read(basic("[[fix]]\nbody = \"plate\"\nwhere = {boundary = true}\nslide = true\n"
                  "[[support]]\nbody = \"plate\"\nstiffness = \"2e5N/m3\"\n"
@@ -180,7 +182,7 @@ TEST_F(SceneTest, bedsAndSlidesHoldAndLeaveTheRestToRigidMotions) {
   }
 }
 
-TEST_F(SceneTest, aMeshWithoutNormalsIsFlatFacetsAndANoteSaysSo) {
+TEST_F(SceneTest, AMeshWithoutNormalsIsFlatFacetsAndANoteSaysSo) {
   const LoadedScene loaded = load(basic());
   const ShellBody& body = loaded.model.shells.at(0);
   EXPECT_FALSE(body.curved);
@@ -194,7 +196,7 @@ TEST_F(SceneTest, aMeshWithoutNormalsIsFlatFacetsAndANoteSaysSo) {
   EXPECT_FALSE(load(std::string(run) + ball + "rest = \"flat\"\n").model.shells.at(0).curved);
 }
 
-TEST_F(SceneTest, scaleAndUnitGiveMillimetres) {
+TEST_F(SceneTest, ScaleAndUnitGiveMillimetres) {
   const std::string off =
       "[run]\nkind = \"static\"\n[[shell]]\nname = \"t\"\nmesh = \"plate.off\"\nthickness = \"1mm\"\n"
       "young = \"1MPa\"\npoisson = 0.3\n";
@@ -208,7 +210,7 @@ TEST_F(SceneTest, scaleAndUnitGiveMillimetres) {
   }
 }
 
-TEST_F(SceneTest, probesTakeTheNearestNode) {
+TEST_F(SceneTest, ProbesTakeTheNearestNode) {
   const LoadedScene loaded =
       load(basic("[[probe]]\nname = \"tip\"\nbody = \"plate\"\nnearest = [\"10mm\", \"9mm\", \"3mm\"]\n"));
   ASSERT_EQ(loaded.model.probes.size(), 1U);
@@ -216,7 +218,7 @@ TEST_F(SceneTest, probesTakeTheNearestNode) {
   EXPECT_EQ(loaded.model.probes[0].name, "tip");
 }
 
-TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
+TEST_F(SceneTest, TheResolvedTextReadsAsTheSameScene) {
   const std::string text =
       "[run]\nkind = \"dynamic\"\nduration = \"0.3s\"\nstep = \"7ms\"\ndamping = {stiffness = \"3us\"}\n"
       "integrator = \"generalised-alpha\"\nspectral_radius = 0.3\nadaptive = \"0.07%\"\ncg_iterations = 70\n" +
@@ -248,7 +250,7 @@ TEST_F(SceneTest, theResolvedTextReadsAsTheSameScene) {
   EXPECT_THAT(resolved, HasSubstr("mesh = \"" + (folder_ / "plate.ply").string()));
 }
 
-TEST_F(SceneTest, pathsAreReadAndWrittenAgain) {
+TEST_F(SceneTest, PathsAreReadAndWrittenAgain) {
   const std::string more = std::string(plate) +
                            "[[probe]]\nname = \"a\"\nbody = \"plate\"\nnearest = [\"0mm\", \"0mm\", \"0mm\"]\n" +
                            "[[probe]]\nname = \"tip\"\nbody = \"plate\"\nnearest = [\"9mm\", \"9mm\", \"0mm\"]\n";
@@ -272,7 +274,7 @@ TEST_F(SceneTest, pathsAreReadAndWrittenAgain) {
   EXPECT_FALSE(run_of("max_steps = 5").until);
 }
 
-TEST_F(SceneTest, modesAreReadAndWrittenAgain) {
+TEST_F(SceneTest, ModesAreReadAndWrittenAgain) {
   const std::string dense = std::string(plate) + "density = \"1g/cm3\"\n";
   const auto run_of = [&](const std::string& lines) {
     const Scene scene = read("[run]\n" + lines + "\n" + dense);
@@ -315,7 +317,7 @@ TEST_F(SceneTest, AKeyOfVeryManyPartsIsRefusedNotACrash) {
 
 class WrongScene : public SceneTest, public ::testing::WithParamInterface<Wrong> {};
 
-TEST_P(WrongScene, isAnErrorWithItsPlace) {
+TEST_P(WrongScene, IsAnErrorWithItsPlace) {
   const Wrong& wrong = GetParam();
   try {
     (void)load(wrong.text);
@@ -531,10 +533,17 @@ const std::vector<Wrong> wrong_scenes{
      ":14:8: ", "two probes"},
 };
 
+TEST(SceneManual, standsInTheManualsPage) {
+  const std::filesystem::path page = std::filesystem::path(__FILE__).parent_path() / "../../../../docs/scene.md";
+  const std::string text = read_file(page, std::size_t{1} << 20);
+  EXPECT_TRUE(text.ends_with(scene_manual())) << "docs/scene.md must end with the keys as they are:\n"
+                                              << scene_manual();
+}
+
 constexpr const char* without_thickness =
     "[[shell]]\nname = \"plate\"\nmesh = \"plate.ply\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
 
-TEST_F(SceneTest, thicknessOfEveryVertexComesFromTheMesh) {
+TEST_F(SceneTest, ThicknessOfEveryVertexComesFromTheMesh) {
   TriangleMesh mesh = square(4);
   std::vector<double> quality;  // any property will do
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
@@ -571,7 +580,7 @@ TEST_F(SceneTest, thicknessOfEveryVertexComesFromTheMesh) {
 INSTANTIATE_TEST_SUITE_P(all, WrongScene, ::testing::ValuesIn(wrong_scenes),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST_F(SceneTest, damagedTextNeverCrashes) {
+TEST_F(SceneTest, DamagedTextNeverCrashes) {
   const std::string text = scene_text(read(basic(clamped)));
   load_damaged(text, {'\0', '"', ']', '{', '\xff', '9'});
 }

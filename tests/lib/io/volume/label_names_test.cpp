@@ -68,7 +68,7 @@ protected:
   TemporaryFolder folder;
 };
 
-TEST_F(LabelTables, are_told_by_their_content) {
+TEST_F(LabelTables, AreToldByTheirContent) {
   const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
   EXPECT_THAT(read(bids), ElementsAre(Pair(1, "aorta"), Pair(52, "left atrium")));
   EXPECT_THAT(read("\xef\xbb\xbf" + bids), ElementsAre(Pair(1, "aorta"), Pair(52, "left atrium")));
@@ -91,7 +91,7 @@ std::string utf16(const std::string& latin_1, Endian endian) {
   return bytes;
 }
 
-TEST_F(LabelTables, may_be_in_latin_1_or_utf_16) {
+TEST_F(LabelTables, MayBeInLatin1OrUtf16) {
   const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
   const std::string latin_1 = "index\tname\n1\tArt\xe8re f\xe9morale\n2\tc\x9cur\n";
   EXPECT_THAT(read(latin_1), ElementsAre(Pair(1, "Artère fémorale"), Pair(2, "cœur")));
@@ -109,7 +109,7 @@ TEST_F(LabelTables, may_be_in_latin_1_or_utf_16) {
   EXPECT_THAT(error_in(utf16("1 aorta\n", Endian::little).substr(2)), HasSubstr("save it as UTF-8"));
 }
 
-TEST_F(LabelTables, may_have_any_separator_and_names_with_one_in_them) {
+TEST_F(LabelTables, MayHaveAnySeparatorAndNamesWithOneInThem) {
   const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
   EXPECT_THAT(read("Label;Name;Farbe\n1;aorta;#ff0000\n2;left, right;#00ff00\n"),
               ElementsAre(Pair(1, "aorta"), Pair(2, "left, right")));
@@ -127,7 +127,7 @@ TEST_F(LabelTables, may_have_any_separator_and_names_with_one_in_them) {
   EXPECT_THAT(error_in("aorta;1\n"), HasSubstr("begins with their names, index and name"));
 }
 
-TEST_F(LabelTables, may_be_json) {
+TEST_F(LabelTables, MayBeJson) {
   const auto read = [&](const std::string& text) { return read_label_names(folder.file("any.name", text)); };
   const auto two = ElementsAre(Pair(1, "aorta"), Pair(2, "left atrium"));
   EXPECT_THAT(read(R"({"1": "aorta", "2": "left atrium"})"), two);
@@ -159,7 +159,7 @@ TEST_F(LabelTables, may_be_json) {
   EXPECT_THAT(error_in("{\"1\": \"" + std::string(201, 'a') + "\"}"), HasSubstr("201 bytes"));
 }
 
-TEST_F(LabelTables, with_several_names_of_a_label_are_told) {
+TEST_F(LabelTables, WithSeveralNamesOfALabelAreTold) {
   EXPECT_FALSE(several_names("t.tsv", {{1, "aorta"}, {2, "vein"}, {1, "aorta"}}));
   const auto warning = several_names("t.tsv", {{1, "aorta"}, {2, "vein"}, {1, "trachea"}});
   ASSERT_TRUE(warning);
@@ -170,7 +170,7 @@ TEST_F(LabelTables, with_several_names_of_a_label_are_told) {
   EXPECT_FALSE(several_names("t.tsv", {{1, "1"}, {2, "7"}}));
 }
 
-TEST_F(LabelTables, that_are_none_are_refused_with_their_line) {
+TEST_F(LabelTables, ThatAreNoneAreRefusedWithTheirLine) {
   EXPECT_THAT(error_in(""), HasSubstr("names no label"));
   EXPECT_THAT(error_in("# only a comment\n"), HasSubstr("names no label"));
   EXPECT_THAT(error_in("1 aorta 1 2 3 4\nsome notes on the scan\n"), HasSubstr(":2: is no line of a table"));
@@ -196,7 +196,7 @@ TEST_F(LabelTables, that_are_none_are_refused_with_their_line) {
   EXPECT_THROW(read_label_names(folder / ""), InputError);
 }
 
-TEST_F(LabelTables, damaged_ones_are_read_or_refused) {
+TEST_F(LabelTables, DamagedOnesAreReadOrRefused) {
   std::size_t refused = 0;
   const std::string json = R"({"labels": {"aorta": 1, "left atrium": 2, "both": [1, 2]}})";
   for (const std::string& text :
@@ -212,7 +212,7 @@ TEST_F(LabelTables, damaged_ones_are_read_or_refused) {
   EXPECT_GT(refused, 100U);
 }
 
-TEST_F(LabelTables, beside_a_volume_have_its_stem) {
+TEST_F(LabelTables, BesideAVolumeHaveItsStem) {
   for (const char* name : {"scan.tsv", "scan.txt", "scan.nii.gz.txt", "other.tsv"}) {
     folder.file(name, bids);
   }
@@ -222,7 +222,7 @@ TEST_F(LabelTables, beside_a_volume_have_its_stem) {
   EXPECT_TRUE(label_tables_beside(folder / "absent.nii").empty());
 }
 
-TEST(LabelNamesTest, are_found_by_value_or_name) {
+TEST(LabelNamesTest, AreFoundByValueOrName) {
   const LabelNames names{{1, "aorta"}, {2, "colon"}, {3, "aorta"}, {2, "bowel"}, {4, ""}};
   EXPECT_EQ(find_label(names, "2"), 2);
   EXPECT_EQ(find_label(names, "9"), 9) << "a value needs no name";
@@ -248,7 +248,7 @@ TEST(LabelNamesTest, are_found_by_value_or_name) {
   EXPECT_EQ(nearest_label({}, "aorta"), "");
 }
 
-TEST(NiftiLabelNames, stand_in_a_header_extension) {
+TEST(NiftiLabelNames, StandInAHeaderExtension) {
   const TemporaryFolder folder;
   for (const int version : {1, 2}) {
     for (const Endian endian : {Endian::little, Endian::big}) {
@@ -265,7 +265,7 @@ TEST(NiftiLabelNames, stand_in_a_header_extension) {
   }
 }
 
-TEST(NiftiLabelNames, of_another_extension_are_not_looked_for) {
+TEST(NiftiLabelNames, OfAnotherExtensionAreNotLookedFor) {
   const TemporaryFolder folder;
   for (const auto& [content, code] : {std::pair{xml_of(two_labels), 6}, std::pair{std::string("a comment"), 0}}) {
     const VolumeFile file = read_both_ways(folder.file("v.nii", extended(content, code)));
@@ -274,7 +274,7 @@ TEST(NiftiLabelNames, of_another_extension_are_not_looked_for) {
   }
 }
 
-TEST(NiftiLabelNames, damaged_ones_are_a_warning_and_the_voxels_are_read) {
+TEST(NiftiLabelNames, DamagedOnesAreAWarningAndTheVoxelsAreRead) {
   const TemporaryFolder folder;
   const std::string bomb =
       "<!DOCTYPE x [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><LabelTable><Label "
@@ -298,7 +298,7 @@ TEST(NiftiLabelNames, damaged_ones_are_a_warning_and_the_voxels_are_read) {
   }
 }
 
-TEST(NiftiLabelNames, hostile_extensions_are_read_or_refused) {
+TEST(NiftiLabelNames, HostileExtensionsAreReadOrRefused) {
   const TemporaryFolder folder;
   const std::string bytes = extended(xml_of(two_labels));
   for (std::uint64_t seed = 0; seed < 1500; ++seed) {

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "tunica/chain/compare.hpp"
+#include "tunica/chain/decimate.hpp"
+#include "tunica/chain/extract.hpp"
+#include "tunica/chain/relax.hpp"
+#include "tunica/core/json.hpp"
+
+#include <optional>
+
+/// What reports say of each stage, key by key (`result` in docs/command-line.md).
+namespace tunica::chain {
+
+/// @param surface  none: every key, without a value
+Json report(const std::optional<SurfaceNumbers>& surface);
+Json report(const Comparison& found);
+Json report(const Decimation& found);
+Json report(const Relaxation& found);
+
+}  // namespace tunica::chain

@@ -1,0 +1,637 @@
+#include "tunica/chain/simulate.hpp"
+
+#include "tunica/accuracy/accuracy.hpp"
+#include "tunica/accuracy/estimates.hpp"
+#include "tunica/core/error.hpp"
+#include "tunica/core/version.hpp"
+#include "tunica/fit/relax.hpp"
+#include "tunica/io/file/output_file.hpp"
+#include "tunica/io/mesh/mesh_file.hpp"
+#include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/result/page_file.hpp"
+#include "tunica/io/result/result_export.hpp"
+#include "tunica/io/result/result_file.hpp"
+#include "tunica/io/scene/scene_file.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
+#include "tunica/mechanics/runs/hold_doubts.hpp"
+#include "tunica/mechanics/runs/meeting_walls.hpp"
+#include "tunica/mechanics/runs/solve.hpp"
+#include "tunica/mechanics/runs/unloaded.hpp"
+#include "tunica/shell/distance/shell_distance.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/surface/mesh/measure.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <iterator>
+#include <map>
+
+namespace tunica::chain {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename Kind>
+bool is_kind(const RunSettings& run) {
+  return std::holds_alternative<Kind>(run.kind);
+}
+
+bool is_modes(const RunSettings& run) { return is_kind<FrequencyRun>(run) || is_kind<BucklingRun>(run); }
+
+/// The parts of a run, one after the other.
+struct Stages {
+  const Context& context;
+  std::shared_ptr<void> now{};
+
+  void operator()(const char* name) {
+    now.reset();
+    now = context.stage(name);
+  }
+};
+
+void warn_of(const fs::path& subject, std::vector<Warning> warnings, const Context& context) {
+  for (Warning& warning : warnings) {
+    warning.text = fmt::format("{}: {}", subject.string(), warning.text);
+    context.warn(warning);
+  }
+}
+
+/// The world axes that the mesh of the first shells says.
+std::string space_of_shells(const Scene& scene, const std::string& otherwise) {
+  return scene.shells.empty()
+             ? otherwise
+             : read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm).space.value_or(otherwise);
+}
+
+std::vector<std::string> surface_exports(const Drawing& drawing) {
+  std::vector<std::string> endings;
+  for (const char* format : {"glb", "obj", "stl", "3mf"}) {
+    if (drawing.has(format)) {
+      endings.push_back(fmt::format(".{}", format));
+    }
+  }
+  return endings;
+}
+
+ExportOptions export_options(const SimulateSettings& settings) {
+  const Drawing& drawing = settings.drawing;
+  return {.pvd = drawing.has("pvd"),
+          .xmf = drawing.has("xmf"),
+          .inp = drawing.has("inp"),
+          .feb = drawing.has("feb"),
+          .surfaces = surface_exports(drawing),
+          .run = settings.scene.run,
+          .tessellation = static_cast<int>(drawing.tessellation.value_or(0))};
+}
+
+/// Where states go: the journal, the record, the result file, and what other programs draw.
+class Recorder {
+public:
+  Recorder(const SimulateSettings& settings, const System& system, const LoadedRun& loaded, RunJournal& journal,
+           RunRecord& record, const Context& context)
+      : context_(context),
+        model_(system.model()),
+        is_modes_(chain::is_modes(settings.scene.run)),
+        record_(record),
+        file_(settings.out, model_, result_options(settings, journal.identity(), record, context)),
+        fields_(system),
+        crossings_(model_) {
+    if (std::ranges::find(settings.drawing.exported, true) != settings.drawing.exported.end()) {
+      ExportOptions options = export_options(settings);
+      options.made_by = fmt::format("tunica {}: {}", version,
+                                    settings.resume ? context.redact(journal.identity().command) : context.command());
+      options.overwrite = context.overwrite || settings.resume;
+      options.space = options.surfaces.empty() ? loaded.space : space_of_shells(settings.scene, loaded.space);
+      exports_.emplace(settings.out, model_, options);
+    }
+  }
+
+  void operator()(const State& state) {
+    const ElementFields of_state = fields_(state);
+    record_.take(model_, state, of_state);
+    file_.append(state, of_state);
+    if (const auto written = exports_ ? exports_->append(state, of_state) : std::nullopt) {
+      context_.wrote(*written);
+    }
+    if (!is_modes_ || !drawn || drawn->first.time == 0) {
+      drawn.emplace(state, of_state);
+    }
+    ended = state;
+    if (!is_modes_) {
+      crossings_.see(state);
+    }
+  }
+
+  /// Gives the files their names.
+  void commit(bool converged) {
+    if (exports_) {
+      exports_->commit();
+    }
+    file_.commit(converged);  // last: what is not renamed can still be resumed
+  }
+
+  [[nodiscard]] const std::optional<Warning>& crossing() const { return crossings_.found(); }
+
+  std::optional<std::pair<State, ElementFields>> drawn;  ///< the last state, or the first mode
+  State ended;
+
+private:
+  static ResultOptions result_options(const SimulateSettings& settings, const RunIdentity& origin,
+                                      const RunRecord& record, const Context& context) {
+    std::vector<std::pair<std::string, std::string>> inputs = origin.inputs;
+    for (auto& [path, hash] : inputs) {
+      path = context.redact(path);
+    }
+    return {settings.scene.run,
+            record.unloaded != nullptr,
+            context.redact(origin.command),
+            context.redact(origin.scene),
+            record.accuracy ? context.redact(accuracy_report(*record.accuracy, false).dump(1)) : "",
+            inputs,
+            static_cast<int>(settings.drawing.tessellation.value_or(0)),
+            context.overwrite};
+  }
+
+  const Context& context_;
+  const Model& model_;
+  bool is_modes_;
+  RunRecord& record_;
+  ResultFile file_;
+  std::optional<ResultExport> exports_;
+  ElementFieldEvaluator fields_;
+  CrossingWatch crossings_;
+};
+
+/// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
+/// @param needed  else, where it is hardly finer, it is left out with a warning
+/// @return whether it can be used
+bool require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path, bool needed,
+                        const Context& context) {
+  constexpr std::size_t facets_per_shell = 2;
+  constexpr double farthest_mean = 0.02;  // of the diagonal
+  const std::size_t facets = target.mesh().triangles.size();
+  const bool is_finer = facets >= facets_per_shell * shell.triangles.size();
+  if (!is_finer && needed) {
+    throw InputError(
+        fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
+                    path.string(), facets, shell.triangles.size()));
+  }
+  if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
+    throw InputError(
+        fmt::format("{}: lies {:.3g} mm from the shells in the mean, {:.2g} % of its diagonal: it is not the "
+                    "surface that they were fitted to",
+                    path.string(), mean, 100 * mean / target.diagonal()));
+  }
+  if (!is_finer) {
+    context.warn(
+        {Weight::minor, "error of the mesh",
+         fmt::format("{}: has {} triangles, too few to fit four times the {} shells to it: how far the answers "
+                     "may be off by the mesh is not estimated; up to {} shells it can be (SHELLS={})",
+                     path.string(), facets, shell.triangles.size(), facets / facets_per_shell,
+                     facets / facets_per_shell)});
+  }
+  return is_finer;
+}
+
+/// Reads the target of a body, which then faces as its shells do; null where it cannot be used.
+std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& mesh, const fs::path& path, bool needed,
+                                    LoadedRun& loaded, const Context& context) {
+  MeshFile file = read_mesh(path, shell.unit_mm, true);
+  if (const auto note = unit_note(file, path)) {
+    context.warn(*note);
+  }
+  require_surface(file, path);
+  const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
+  require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
+  require_near(own, shell.mesh, file, path);
+  loaded.space = common_space(own, shell.mesh, file, path);
+  if (file.voxel) {
+    loaded.voxel = std::max(loaded.voxel.value_or(0), shell.scale * *file.voxel);
+  }
+  for (Vec3& vertex : file.mesh.vertices) {
+    vertex *= shell.scale;
+  }
+  auto target = std::make_unique<Target>(std::move(file.mesh));
+  if (faces_other_way({mesh.vertices, mesh.triangles}, *target)) {
+    context.warn({Weight::minor, "faces the other way",
+                  fmt::format("{}: faces the other way than the shells: its triangles are turned around to agree",
+                              path.string())});
+    target = std::make_unique<Target>(turned_around(target->mesh()));
+  }
+  if (!require_own_target(mesh, *target, path, needed, context)) {
+    target.reset();
+  }
+  return target;
+}
+
+void read_targets(SimulateSettings& settings, LoadedRun& loaded, const Context& context) {
+  const Scene& scene = settings.scene;
+  loaded.targets.resize(scene.shells.size());
+  std::map<std::string, fs::path> paths;
+  if (scene.accuracy) {
+    paths = scene.accuracy->targets;
+  } else if (settings.target && !scene.shells.empty()) {
+    paths = {{scene.shells.front().name, *settings.target}};
+  }
+  for (const auto& [name, path] : paths) {
+    const auto found = std::ranges::find(scene.shells, name, &SceneShell::name);
+    const std::size_t b = found - scene.shells.begin();
+    settings.inputs.push_back(path);
+    context.reads(path);
+    loaded.targets[b] =
+        read_target(*found, loaded.model.shells[b].mesh, path, scene.accuracy.has_value(), loaded, context);
+  }
+}
+
+/// Goes from level to level. @return the system of the last one
+System choose_model(SimulateSettings& settings, const LoadedRun& loaded, const Model& model, RunRecord& record,
+                    const Context& context) {
+  Scene& scene = settings.scene;
+  const SceneAccuracy& asked = *scene.accuracy;
+  const AccuracyRequest request{
+      asked.within,        asked.of,   settings.max_shells.value_or(AccuracyRequest().max_shells),
+      asked.probe,         asked.axis, loaded.voxel,
+      settings.max_seconds};
+  std::vector<const Target*> targets;
+  for (const auto& target : loaded.targets) {
+    targets.push_back(target.get());
+  }
+  const auto accuracy = std::make_shared<const Accuracy>(naming(settings.inputs.front().string(), [&] {
+    return solve_within(
+        model.shells, targets, request, scene.run,
+        [&](std::vector<ShellBody> bodies) { return resolve_scene(scene, std::move(bodies)); },
+        [&](const AccuracyLevel& level) { context.note(level_note(level, request)); });
+  }));
+  if (is_kind<DynamicRun>(scene.run) && is_kind<StaticRun>(accuracy->settings)) {
+    context.note("the loads rise so slowly that rest under them serves: the result holds that state, not the motion");
+  }
+  scene.run = accuracy->settings;
+  record = RunRecord(accuracy->system->model(), scene.run);
+  record.accuracy = accuracy;
+  return *accuracy->system;
+}
+
+/// Puts the stress of the image into the walls, or takes the shells back to what they are without its pressure.
+void take_as_imaged(std::optional<System>& system, const SimulateSettings& settings, RunRecord& record,
+                    const Context& context) {
+  const fs::path& subject = settings.inputs.front();
+  const Model& model = system->model();
+  bool unload = false;
+  for (const Load& load : model.loads) {
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->imaged_at) {
+      unload = unload || pressure->unload;
+      const bool same = !record.imaging_pressure || *record.imaging_pressure == *pressure->imaged_at;
+      record.imaging_pressure = same ? pressure->imaged_at : std::nullopt;
+    }
+  }
+  if (!unload) {
+    record.prestress_residual = naming(subject.string(), [&] { return *system->prestress_residual(); });
+    record.rests_as_imaged = system->rests_as_imaged();
+    warn_of(subject, prestress_warnings(record), context);
+    return;
+  }
+  auto found = std::make_shared<Unloaded>(naming(subject.string(), [&] {
+    return find_unloaded(model, settings.scene.run, [&](double part, double change) {
+      context.detail(
+          fmt::format("unloaded shape: {:.3g} of the pressure, moved by {:.3g} mm in the mean", part, change));
+    });
+  }));
+  record.unloaded = found;
+  warn_of(subject, unloaded_warnings(*found), context);
+  context.note(fmt::format(
+      "the unloaded shape is found: under the pressure of the image it lies {:.2g} mm from the image, {:.2g} "
+      "mm at most",
+      found->mean_distance, found->largest_distance));
+  system.emplace(std::move(found->model), settings.scene.run);
+}
+
+RunJournal begin_journal(const SimulateSettings& settings, const LoadedRun& loaded, std::optional<RunJournal> before,
+                         const Context& context) {
+  RunIdentity identity{version, loaded.asked, context.command(), {}, {}, settings.drawing.as_options()};
+  for (const fs::path& path : settings.inputs) {
+    identity.inputs.emplace_back(path.string(), sha256_of_file(path));
+  }
+  for (const fs::path& mesh : mesh_files(settings.scene)) {
+    identity.meshes.emplace_back(mesh.string(), sha256_of_file(mesh));
+  }
+  context.has_read();  // the hashes are of what was read
+  if (!before) {
+    return RunJournal::create(part_of(settings.out), identity);
+  }
+  if (const std::string differs = difference(before->identity(), identity); !differs.empty()) {
+    throw InputError(fmt::format("{}: is another run: {}", settings.resume->string(), differs));
+  }
+  return *std::move(before);
+}
+
+Summary solve_and_record(const System& system, const SimulateSettings& settings, RunJournal& journal, Recorder& record,
+                         Stages& stage, const Context& context) {
+  const std::string subject = settings.inputs.front().string();
+  Resumption resumption;
+  if (settings.resume) {
+    const std::string part = settings.resume->string();
+    resumption.from = journal.replay(system.model(), std::ref(record));
+    context.note(resumption.from ? fmt::format("{}: goes on after step {}", part, resumption.from->summary.steps)
+                                 : fmt::format("{}: begins again, it has no checkpoint yet", part));
+  }
+  stage("solve");
+  resumption.on_step = [&](const std::function<Checkpoint()>& make) {
+    stage("write");
+    journal.offer(make);
+    stage("solve");
+  };
+  resumption.on_slow_step = [&](const std::string& text) {
+    context.warn({Weight::note, "slow step", fmt::format("{}: {}", subject, text)});
+  };
+  const auto on_state = [&](const State& state) {
+    stage("write");
+    journal.append(state);
+    record(state);
+    stage("solve");
+  };
+  try {
+    return naming(subject, [&] { return solve(system, on_state, context.progress("solve"), resumption); });
+  } catch (const InputError&) {
+    journal.remove();
+    throw;
+  } catch (const RequirementError& error) {
+    journal.remove();  // it would end at the same step again
+    throw RequirementError(fmt::format("{}; what there is stays in {}.part", error.what(), settings.out.string()));
+  }
+}
+
+void write_shells(const fs::path& out, const ShellMesh& mesh, const std::string& space, bool partial,
+                  const Context& context) {
+  PlyOptions ply;
+  ply.comments = {"made by " + context.made_by()};
+  ply.space = space;
+  ply.overwrite = context.overwrite;
+  ply.partial = partial;
+  write_ply(out, mesh, ply);
+}
+
+/// Of shells that leave the run as relax's do the report says what relax's says.
+ShellCertificate certify(const ShellMesh& shell, const Target* target, const Progress& progress) {
+  ShellCertificate made{min_angle_degrees(flat_facets(shell)), {}, 0};
+  if (target != nullptr) {
+    made.diagonal = target->diagonal();
+    ShellDistanceOptions measuring;
+    measuring.width = 1e-4 * made.diagonal;
+    measuring.progress = progress;
+    made.distance = shell_distance(shell, *target, measuring).both;
+  }
+  return made;
+}
+
+/// Whether one refinement can be solved besides.
+bool may_refine(const SimulateSettings& settings, const LoadedRun& loaded) {
+  return is_kind<StaticRun>(settings.scene.run) && !loaded.targets.empty() && loaded.targets.front() &&
+         !settings.unloaded && holds_for_finer_meshes(settings.scene);
+}
+
+/// Says how far the answers may be off: by the levels of an accuracy, or by one refinement solved besides.
+void estimate(const System& system, const SimulateSettings& settings, const LoadedRun& loaded, const Recorder& recorded,
+              Stages& stage, RunRecord& record, const Context& context) {
+  if (record.accuracy) {
+    record.estimates = record.accuracy->estimates;
+    return;
+  }
+  const fs::path& subject = settings.inputs.front();
+  if (may_refine(settings, loaded) && recorded.drawn) {
+    stage("solve");
+    RefinedAnswers refined = naming(subject.string(), [&] {
+      return estimate_by_refinement(
+          system.model(), recorded.drawn->first, recorded.drawn->second, {loaded.targets.front().get()},
+          system.settings(),
+          [&](std::vector<ShellBody> bodies) { return resolve_scene(settings.scene, std::move(bodies)); });
+    });
+    if (!refined.reason.empty()) {
+      context.warn(
+          {Weight::minor, "error of the mesh",
+           fmt::format("{}: how far the answers may be off by the mesh is not known, for on shells split in four {}: "
+                       "take more shells (SHELLS)",
+                       subject.string(), refined.reason)});
+    }
+    record.estimates = std::move(refined.estimates);
+    stage("write");
+  }
+  warn_of(subject, estimate_warnings(record.estimates), context);
+}
+
+void require_accuracy(const Accuracy& accuracy, const SimulateSettings& settings, RunJournal& journal,
+                      const Context& context) {
+  const std::string subject = settings.inputs.front().string();
+  std::ranges::for_each(accuracy_notes(accuracy), context.note);
+  if (accuracy.reasons.empty()) {
+    return;
+  }
+  if (!accuracy.request.max_seconds) {
+    journal.remove();
+    throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject, missed_accuracy(accuracy),
+                                       settings.out.string()));
+  }
+  context.warn(
+      {Weight::minor, "accuracy not reached",
+       fmt::format("{}: {}; shells made anew of this surface, four times as many (of the pipeline SHELLS={} in "
+                   "place of ACCURACY, OF and --max-seconds), may do better, as far as the surface has them",
+                   subject, missed_accuracy(accuracy), 4 * accuracy.levels.back().shells)});
+}
+
+/// Of which state a picture is: the last one, or the first mode.
+std::string when(const RunSettings& run, const State& state) {
+  return is_modes(run)              ? "of the first mode (only the shape counts)"
+         : is_kind<DynamicRun>(run) ? fmt::format("after {:.4g} s", state.time)
+         : state.load_factor == 1   ? "under the whole load"
+                                    : fmt::format("under {:.4g} times the load", state.load_factor);
+}
+
+void tell_modes(const Summary& summary, const RunSettings& run, const fs::path& subject, const Context& context) {
+  const auto* frequencies = std::get_if<FrequencyRun>(&run.kind);
+  context.note(
+      modes_note(summary, frequencies != nullptr ? frequencies->count : std::get<BucklingRun>(run.kind).count));
+  if (summary.stiffened_from && frequencies == nullptr) {
+    context.warn(
+        {Weight::major, "coarse shells",
+         fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
+                     "elements are not seen, and the factors may be too high: refine it",
+                     subject.string())});
+  }
+}
+
+/// The answer in a line.
+std::string answer_text(const LastState& last, bool with_wall) {
+  std::string text = fmt::format("largest displacement {:.4g} mm", last.largest_displacement);
+  if (last.peak) {
+    text += fmt::format(" at the end of the motion ({:.4g} mm at most in the states written, at {:.4g} s)",
+                        last.peak->displacement, last.peak->time);
+  }
+  if (with_wall) {
+    text += fmt::format(
+        " (99 % of the wall below {:.4g} mm), membrane stress of the wall {} (99th percentile), at its faces {}",
+        last.displacement_p99, pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99));
+  }
+  return text;
+}
+
+void tell(const Model& model, const SimulateSettings& settings, const Recorder& recorded, const RunRecord& record,
+          const Context& context) {
+  const fs::path& subject = settings.inputs.front();
+  const LastState last = record.last.value_or(LastState());
+  context.note(fmt::format("{} nodes in {} steps, {}: {}", model.node_count(), record.summary->steps,
+                           record.converged ? "converged" : "not asked to converge",
+                           answer_text(last, !model.shells.empty())));
+  Summary without = *record.summary;
+  if (record.accuracy) {
+    without.linear_departure.reset();  // a linear model was held against a nonlinear one
+  }
+  warn_of(subject, run_warnings(settings.scene.run, without, last), context);
+  warn_of(subject, contact_warnings(record), context);
+  if (recorded.crossing()) {
+    context.warn(*recorded.crossing());
+  }
+  // Sentences that name their places themselves.
+  std::ranges::for_each(swings_of(model, recorded.ended), context.warn);
+  std::ranges::for_each(doubts_of_suction(model, settings.scene.run), context.warn);
+}
+
+}  // namespace
+
+bool Drawing::has(std::string_view format) const {
+  return exported[static_cast<std::size_t>(std::ranges::find(formats, format) - formats.begin())];
+}
+
+std::vector<std::pair<std::string, std::string>> Drawing::as_options() const {
+  std::vector<std::string_view> names;
+  std::ranges::copy_if(formats, std::back_inserter(names), [&](std::string_view name) { return has(name); });
+  return {{"--tessellation", tessellation ? std::to_string(*tessellation) : "default"},
+          {"--export", names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", "))},
+          {"--no-paths", no_paths ? "yes" : "no"}};
+}
+
+void ask_for_unloaded(Scene& scene) {
+  bool imaged = false;
+  for (SceneLoad& load : scene.loads) {
+    if (auto* pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && pressure->imaged_at) {
+      pressure->unload = imaged = true;
+      load.places.keys.try_emplace("unload", Place{"--unloaded", true});
+    }
+  }
+  if (!imaged || scene.shells.size() > 1) {
+    throw UsageError(imaged ? "--unloaded: the scene has more than one body, one can be written"
+                            : "--unloaded belongs to --imaged-at, or imaged_at in a scene: give that too");
+  }
+  check_scene(scene);
+}
+
+void announce_outputs(const SimulateSettings& settings, bool resumed, const Context& context) {
+  context.writes(settings.out, {".hdf", ".vtkhdf", ".h5", ".hdf5"});
+  std::vector<fs::path> beside = export_paths(settings.out, export_options(settings));
+  beside.insert(beside.begin(), page_path(settings.out));
+  for (const fs::path& path : beside) {
+    if (resumed) {
+      fs::remove(path);
+    }
+    context.writes(path, {});
+  }
+  if (settings.picture) {
+    context.writes(*settings.picture, {".png"});
+  }
+}
+
+LoadedRun load_run(SimulateSettings& settings, const Context& context) {
+  const Scene& scene = settings.scene;
+  LoadedRun loaded;
+  loaded.asked = scene_text(scene, settings.out);
+  LoadedScene read = load_scene(scene);
+  loaded.model = std::move(read.model);
+  read_targets(settings, loaded, context);
+  std::ranges::for_each(read.notes, context.note);
+  std::ranges::for_each(read.warnings, context.warn);
+  for (std::size_t b = 0; scene.accuracy && b < loaded.targets.size(); ++b) {
+    if (!loaded.targets[b] && loaded.model.shells[b].curved) {
+      context.warn({Weight::minor, "no target",
+                    fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry "
+                                "is not seen (--target, or target in [accuracy])",
+                                scene.shells[b].mesh.string())});
+    }
+  }
+  return loaded;
+}
+
+void simulate(SimulateSettings& settings, LoadedRun loaded, std::optional<RunJournal> before, RunRecord& record,
+              const Context& context) {
+  Scene& scene = settings.scene;
+  const std::string subject = settings.inputs.front().string();
+  Stages stage{context};
+  stage("setup");
+  record = RunRecord(loaded.model, scene.run);
+  std::optional<System> system;
+  naming(subject, [&] { system.emplace(std::move(loaded.model), scene.run); });
+  if (scene.accuracy && !settings.out.empty()) {
+    stage("solve");
+    system = choose_model(settings, loaded, system->model(), record, context);
+  }
+  const bool has_estimates = record.accuracy || may_refine(settings, loaded);
+  std::ranges::for_each(doubts(system->model(), scene.run, has_estimates), context.warn);
+  std::ranges::for_each(doubts_of_ends(system->model()), context.warn);
+  if (settings.out.empty()) {
+    return;
+  }
+  if (system->model().is_imaged_under_pressure()) {
+    stage("solve");
+    take_as_imaged(system, settings, record, context);
+  }
+  const Model& model = system->model();
+  RunJournal journal = begin_journal(settings, loaded, std::move(before), context);
+  stage("write");
+  Recorder recorded(settings, *system, loaded, journal, record, context);
+  if (record.accuracy) {
+    for (const State& state : record.accuracy->states) {
+      journal.append(state);
+      recorded(state);
+    }
+    record.summary = record.accuracy->summary;
+  } else {
+    record.summary = solve_and_record(*system, settings, journal, recorded, stage, context);
+  }
+  stage("write");
+  if (settings.shell_out) {
+    const ShellMesh& shell = model.shells.front().mesh;
+    record.certificate = certify(shell, loaded.targets.front().get(), context.progress("certify"));
+    write_shells(*settings.shell_out, shell, loaded.space,
+                 !record.accuracy->reasons.empty() && !record.accuracy->request.max_seconds, context);
+  }
+  // A fixed count of iterations asks for no convergence, so none is claimed.
+  record.converged = record.summary->converged && !scene.run.cg_fixed_count;
+  if (const auto* dynamic = std::get_if<DynamicRun>(&scene.run.kind)) {
+    record.duration = dynamic->duration;
+  }
+  estimate(*system, settings, loaded, recorded, stage, record, context);
+  if (record.accuracy) {
+    require_accuracy(*record.accuracy, settings, journal, context);
+  }
+  if (settings.unloaded) {
+    loaded.space = space_of_shells(scene, loaded.space);
+    write_shells(*settings.unloaded, model.shells.front().mesh, loaded.space, false, context);
+  }
+  if (settings.picture) {
+    const auto& [state, fields] = *recorded.drawn;
+    ResultPictureOptions look = settings.look;
+    look.when = when(scene.run, state);
+    look.is_unloaded = record.unloaded != nullptr;
+    write_file(*settings.picture, result_picture(model, state, fields, look), context.overwrite);
+  }
+  recorded.commit(record.converged);
+  journal.remove();
+  if (is_modes(scene.run)) {
+    tell_modes(*record.summary, scene.run, subject, context);
+  } else {
+    tell(model, settings, recorded, record, context);
+  }
+}
+
+}  // namespace tunica::chain
