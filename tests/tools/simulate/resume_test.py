@@ -160,6 +160,7 @@ ramp = [["0s", 0.0], ["20ms", 1.0]]
             self.run_tool("--resume", "out.hdf.part", says="goes on after step")
             self.assert_same("whole.hdf", "out.hdf")
             os.remove(self.path("out.hdf"))
+            os.remove(self.path("out.page"))
 
     def test_damped_run_terminated_and_continued_beside_its_command(self):
         words = ["--scene", "scene.toml", "out.hdf"]
