@@ -48,10 +48,8 @@ void ask(cli::Tool& tool, const Arguments& a, bool goes_on, chain::SimulateSetti
   if (a.run.check && a.picture.out) {
     throw UsageError("--check and --picture contradict each other: a picture needs a result");
   }
-  const RunSettings& run = settings.scene.run;
   settings.picture = a.picture.out;
-  settings.look = a.picture.options(std::holds_alternative<FrequencyRun>(run.kind) ||
-                                    std::holds_alternative<BucklingRun>(run.kind));
+  settings.look = a.picture.options(settings.scene.run);
   a.accuracy.ask(tool.arguments(), settings.scene);
   settings.target = a.accuracy.target;
   settings.max_shells = cli::count_of(a.accuracy.max_shells, "--max-shells", real(max_index));

@@ -7,6 +7,7 @@ angioplasty, see angioplasty/own.py.
 import argparse
 import json
 import math
+import re
 import shlex
 import shutil
 import subprocess
@@ -16,10 +17,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import vtk
-from vtk.util.numpy_support import vtk_to_numpy
-
-import draw
 
 HERE = Path(__file__).resolve().parent
 
@@ -45,14 +42,13 @@ class Folder:
     def python(self, *words):
         self.run(["/usr/bin/python3", "-B", *words])
 
-    def simulate(self, scene="scene"):
+    def simulate(self, scene="scene", picture=()):
+        """@param picture  what moments.png shows"""
+        drawn = ["--picture", "moments.png", "--colour", "stress", *picture] if picture else []
         threads = ["--threads", self.threads] if self.threads else []
         self.run([self.tools / "tunica-simulate", "--scene", f"{scene}.toml", f"{scene}.hdf", "--export", "pvd", "--report",
-                  f"{scene}.json", "--quiet", "--force", *threads])
+                  f"{scene}.json", *drawn, "--quiet", "--force", *threads])
         return json.loads((self.out / f"{scene}.json").read_text(encoding="utf-8"))["result"]
-
-    def draw(self, *words):
-        self.python(HERE / "draw.py", "scene.hdf", "moments.png", *words)
 
     def chart(self, series, *words):
         """@param series  {name: (x, y)}, each written as a report of its own"""
@@ -71,8 +67,7 @@ def depth_and_force(result, touch):
 
 
 def membrane(folder):
-    result = folder.simulate()
-    folder.draw("--at", 0, 0.25, 0.5, 1, "--cut", "y")
+    result = folder.simulate(picture=["--picture-at", "0 0.25 0.5 1", "--picture-cut=-y"])
     depth, force = depth_and_force(result, 5.5)
     deepest = int(np.argmax(depth))
     folder.chart({"pushed-in": (depth[:deepest + 1], force[:deepest + 1]), "drawn-back": (depth[deepest:], force[deepest:])},
@@ -84,8 +79,7 @@ def membrane(folder):
 
 
 def liver(folder):
-    bare, covered = folder.simulate("bare"), folder.simulate()
-    folder.draw("--at", 0, 0.25, 0.5, 1, "--cut", "y")
+    bare, covered = folder.simulate("bare"), folder.simulate(picture=["--picture-at", "0 0.25 0.5 1", "--picture-cut=-y"])
     curves = {}
     for name, result in (("with-capsule", covered), ("without", bare)):
         depth, force = depth_and_force(result, 35)
@@ -99,64 +93,92 @@ def liver(folder):
     print(f"balance of forces: {covered['balance']['force']:.1e} with, {bare['balance']['force']:.1e} without")
 
 
-def first_hits(surface, points, directions):
-    """How far from each point the triangles of a polydata are, mean over the directions, mm; inf where one meets none."""
-    tree, hits = vtk.vtkOBBTree(), vtk.vtkPoints()
-    tree.SetDataSet(surface)
-    tree.BuildLocator()
-    far = surface.GetLength()
+def lengths(quantities):
+    """mm, of what a scene says."""
+    units = {"um": 1e-3, "mm": 1, "cm": 10, "m": 1000}
+    parts = [re.fullmatch(r"\s*([-+0-9.eE]+?)\s*(um|mm|cm|m)\s*", text).groups() for text in quantities]
+    return np.array([float(number) * units[unit] for number, unit in parts])
 
-    def distance(point, direction):
-        if tree.IntersectWithLine(point, point + far * direction, hits, None) == 0:
-            return np.inf
-        return np.linalg.norm(vtk_to_numpy(hits.GetData()) - point, axis=1).min()
 
-    return np.array([np.mean([distance(point, direction) for direction in directions]) for point in points])
+def drawn_surfaces(path):
+    """What OUT.page draws (docs/results.md). @return [load factor, corners of the shells' triangles, of the solids' faces]"""
+    header, _, numbers = path.read_bytes().partition(b"\n")
+    count, at = json.loads(header), 0
+
+    def take(kind, rows, columns=3):
+        nonlocal at
+        values = np.frombuffer(numbers, kind, rows * columns, at).reshape(rows, columns)
+        at += values.nbytes
+        return values
+
+    shells, triangles = take("<f4", count["points"]), take("<u4", count["triangles"])
+    solids, faces = take("<f4", count["solid_points"]), take("<u4", count["solid_triangles"])
+    states = []
+    for _, _, factor in count["states"]:
+        moved = shells + take("<f4", count["points"])
+        take("<f4", 2 * count["points"], 1)
+        states.append((factor, moved[triangles].astype(float), (solids + take("<f4", count["solid_points"]))[faces].astype(float)))
+    return states
+
+
+def first_hit(triangles, point, direction):
+    """How far a ray goes to the first triangle, mm; inf where it meets none (Moeller and Trumbore 1997)."""
+    a, b, c = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    across = np.cross(direction, c)
+    size = np.sum(b * across, axis=1)
+    from_a = point - a
+    turned = np.cross(from_a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v, distance = np.sum(from_a * across, axis=1) / size, turned @ direction / size, np.sum(c * turned, axis=1) / size
+        hit = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (distance > 0)
+    return distance[hit].min(initial=np.inf)
+
+
+def radii_about(triangles, middle, axis, stations, directions):
+    """Mean distance of the first triangles from an axis; inf where one direction meets none."""
+    heights = (triangles - middle) @ axis
+
+    def radius(station):
+        near = triangles[(heights.min(axis=1) <= station) & (heights.max(axis=1) >= station)]
+        return np.mean([first_hit(near, middle + station * axis, direction) for direction in directions])
+
+    return np.array([radius(station) for station in stations])
 
 
 def lumen(folder, balloon, wall, places):
     """Along the balloon's axis, mean over 36 directions, at the states nearest to the load factors.
     @return {name: (mm from the balloon's middle, radius of the lumen)}, {name: radius of the wall's middle surface}
     """
-    start, end = draw.lengths(balloon["from"]), draw.lengths(balloon["to"])
-    half, largest = np.linalg.norm(end - start) / 2, max(draw.in_unit(radius) for _, radius in balloon["radius"])
+    start, end = lengths(balloon["from"]), lengths(balloon["to"])
+    half, largest = np.linalg.norm(end - start) / 2, max(lengths([radius])[0] for _, radius in balloon["radius"])
     axis = (end - start) / (2 * half)
     stations = np.linspace(-4 / 3, 4 / 3, 57) * (half + largest)
-    points = (start + end) / 2 + np.outer(stations, axis)
-    _, up, side = draw.view_frame(axis, np.eye(3)[np.argmin(np.abs(axis))])[[2, 1, 0]]
+    side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    side /= np.linalg.norm(side)
     angles = 2 * np.pi * (np.arange(36) + 0.5) / 36
-    directions = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), up)
-    with h5py.File(folder.out / "scene.hdf") as file:
-        factors = file["tunica/history/load_factor"][:]
-        grids = {name: draw.deformed(file["tunica"], int(np.argmin(np.abs(factors - place)))) for name, place in places.items()}
+    directions = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), np.cross(axis, side))
+    states = drawn_surfaces(folder.out / "scene.page")
     curves, middle = {}, {}
-    for name, grid in grids.items():
-        shells, deposits = (draw.polydata(grid, kind) for kind in (vtk.VTK_TRIANGLE, vtk.VTK_TETRA))
-        middle[name] = first_hits(shells, points, directions)
-        inner = first_hits(deposits, points, directions) if deposits.GetNumberOfCells() else np.inf
-        radius = np.minimum(middle[name] - wall / 2, inner)
-        curves[name] = stations[np.isfinite(radius)], radius[np.isfinite(radius)]
-        middle[name] = middle[name][np.isfinite(radius)]
+    for name, place in places.items():
+        _, shells, deposits = min(states, key=lambda state: abs(state[0] - place))
+        walls, inner = (radii_about(surface, (start + end) / 2, axis, stations, directions) for surface in (shells, deposits))
+        seen = np.isfinite(walls)
+        curves[name] = stations[seen], np.minimum(walls - wall / 2, inner)[seen]
+        middle[name] = walls[seen]
     return curves, middle
 
 
-def lengthwise(folder, balloon):
-    """Flags of a picture that is cut along the balloon, which lies across it; the larger part of the bodies stays."""
-    start, end = draw.lengths(balloon["from"]), draw.lengths(balloon["to"])
-    along = int(np.argmax(np.abs(end - start)))
-    cut = 1 if along != 1 else 2
-    up, at = 3 - along - cut, (start + end)[cut] / 2
-    with h5py.File(folder.out / "scene.hdf") as file:
-        side = 1 if np.mean(file["tunica/nodes/position"][:, cut]) <= at + 1e-6 else -1
-    view = 0.35 * np.eye(3)[along] + side * np.eye(3)[cut] + 0.25 * np.eye(3)[up]
-    return ["--cut=%s%s=%.6g" % ("" if side > 0 else "-", "xyz"[cut], at), "--up", *np.eye(3, dtype=int)[up], "--view", *view]
+def lengthwise(balloon):
+    """Flags of a picture that is cut along the balloon, which lies across it."""
+    start, end = lengths(balloon["from"]), lengths(balloon["to"])
+    cut = 1 if np.argmax(np.abs(end - start)) != 1 else 2
+    return ["--picture-at", "0 0.2 0.5 1", "--picture-cut=-%s=%.6gmm" % ("xyz"[cut], (start + end)[cut] / 2)]
 
 
 def angioplasty(folder):
-    result = folder.simulate()
     scene = tomllib.loads((folder.out / "scene.toml").read_text(encoding="utf-8"))
-    balloon, wall = scene["rigid"][0], draw.in_unit(scene["shell"][0]["thickness"])
-    folder.draw("--at", 0, 0.2, 0.5, 1, *lengthwise(folder, balloon))
+    balloon, wall = scene["rigid"][0], lengths([scene["shell"][0]["thickness"]])[0]
+    result = folder.simulate(picture=lengthwise(balloon))
     curves, middle = lumen(folder, balloon, wall, {"before": 0.2, "inflated": 0.5, "after": 1.0})
     folder.chart(curves, "--title", "The lumen along the vessel", "--x-label", "along the axis, mm", "--y-label",
                  "radius of the lumen, mm")
@@ -183,8 +205,7 @@ def say_inflated(folder, result):
 
 
 def lens(folder):
-    result = folder.simulate()
-    folder.draw("--at", 0, 0.25, 0.5, 1, "--view", 0.5, -1, 0.6)
+    result = folder.simulate(picture=["--picture-at", "0 0.25 0.5 1"])
     probe = result["probes"]["rim"]
     angle = [math.degrees(np.linalg.norm(r)) for r in probe["rotation_rad"]]
     moment = [2.2 * 2 * min(f, 1 - f) for f in probe["load_factor"]]

@@ -330,8 +330,7 @@ private:
                                          percent_text(field_change_)));
     }
     // Stresses are those away from such layers, where there is any place away from them.
-    if (is_stress(request_.of) &&
-        std::ranges::all_of(near_disturbances(last_->system.model()), [](std::uint8_t near) { return near != 0; })) {
+    if (is_stress(request_.of) && far_from_disturbances(last_->system.model()).empty()) {
       const double edges = edges_per_layer(last_->system.model());
       if (edges < fewest_edges_per_layer) {
         out_.reasons.push_back(

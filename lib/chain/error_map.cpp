@@ -72,6 +72,7 @@ void write_map(const MapFiles& out, const ErrorMap& map, PictureOptions look, co
       look.maximum = out.picture_range->millimetres(*look.diagonal);
     }
     look.lines = map.edges;
+    look.axes = ply.space;
     write_file(*out.picture, png_made_by(surface_picture(map.mesh, map.distances, look), context.made_by()),
                context.overwrite);
   }

@@ -10,8 +10,6 @@ Json interval(const Interval& mm, double scale) { return {{"lower", mm.lower * s
 
 Json triple(const Vec3& x) { return {x.x(), x.y(), x.z()}; }
 
-Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
 }  // namespace
 
 Json report(const std::optional<SurfaceNumbers>& surface) {
@@ -73,9 +71,7 @@ Json report(const Decimation& found) {
   Json result{
       {"triangles_in", found.triangles_in},
       {"triangles", mesh.triangles.size()},
-      {"hausdorff_percent",
-       {{"lower", 100 * found.distance.lower / found.diagonal},
-        {"upper", 100 * found.distance.upper / found.diagonal}}},
+      {"hausdorff_percent", interval(found.distance, 100 / found.diagonal)},
       {"hausdorff_mm", interval(found.distance, 1)},
       {"min_angle_deg", found.angle},
       {"min_angle_held", found.min_angle ? Json(found.made.angle_held) : Json()},
@@ -122,10 +118,10 @@ Json report(const Relaxation& found) {
       {"rms_percent", distance.rms * percent},
       {"flat_hausdorff_percent", interval(found.flat, percent)},
       {"iterations", iterations},
-      {"reached", found.relaxed.reached ? Json(*found.relaxed.reached) : Json()},
+      {"reached", or_null(found.relaxed.reached)},
       {"stopped", found.relaxed.stopped},
       {"diagonal_mm", found.diagonal},
-      {"mean_distance_bound_mm", found.mean_bound ? Json(*found.mean_bound) : Json()},
+      {"mean_distance_bound_mm", or_null(found.mean_bound)},
       {"min_angle_deg", found.angle},
       {"self_intersections", found.crossings},
       {"mean_distance_mm", found.quality.mean_distance},

@@ -25,28 +25,63 @@ constexpr std::array<ShownQuantity, 4> shown_quantities{
      {"Displacement", "Displacement", "mm", 1},
      {"Largest principal strain", "Strain", "%", 100}}};
 
+PictureMoment moment_of(DrawnState drawn, double magnify, const std::optional<PictureCut>& cut) {
+  PictureMoment moment;
+  moment.surface = std::move(drawn.reference);
+  moment.values = std::move(drawn.values);
+  for (std::size_t v = 0; v < drawn.displacement.size(); ++v) {
+    moment.surface.vertices[v] += magnify * drawn.displacement[v];
+  }
+  for (const auto& [from, to] : drawn.edges) {
+    moment.lines.push_back({moment.surface.vertices[from], moment.surface.vertices[to]});
+  }
+  if (cut) {
+    add_section(*cut, drawn.tetrahedra, moment);
+  }
+  return moment;
+}
+
 }  // namespace
 
-std::string result_picture(const Model& model, const State& state, const ElementFields& fields,
+std::string result_picture(const Model& model, const std::vector<PicturedState>& states,
                            const ResultPictureOptions& options) {
-  DrawnState drawn = drawn_state(model, state, fields, options.colour);
   const ShownQuantity& quantity = shown_quantities.at(static_cast<std::size_t>(options.colour));
-  for (double& value : drawn.values) {
-    value *= quantity.per_unit;
-  }
   PictureOptions look;
-  look.title = fmt::format("{} {}", quantity.title, options.when);
   look.quantity = quantity.name;
   look.unit = quantity.unit;
+  look.caption = options.caption.empty() ? "" : options.caption + ". ";
+  look.axes = options.axes;
+  look.outline_name = options.is_unloaded ? "unloaded" : "as imaged";
   if (options.range) {
     look.maximum = *options.range * quantity.per_unit;
   }
-  look.outline_name = options.is_unloaded ? "unloaded" : "as imaged";
-  const Index first = drawn.reference.triangles.front()[0];
-  const Vec3 middle = drawn.reference.vertices[first] + options.magnify * drawn.displacement[first];
-  look.others = drawn_rigids(model, state.time, middle, diagonal(drawn.reference));
-  return moved_picture(drawn.reference, drawn.displacement, drawn.edges, drawn.values, options.magnify,
-                       std::move(look));
+  std::vector<PictureMoment> moments;
+  std::optional<PictureCut> cut;
+  for (const auto& [state, fields, when] : states) {
+    DrawnState drawn = drawn_state(model, state, fields, options.colour);
+    for (double& value : drawn.values) {
+      value *= quantity.per_unit;
+    }
+    const Index first = drawn.reference.triangles.front()[0];
+    const Vec3 middle = drawn.reference.vertices[first] + options.magnify * drawn.displacement[first];
+    TriangleMesh rigids = drawn_rigids(model, state.time, middle, diagonal(drawn.reference));
+    if (options.moments.empty() && !options.cut) {
+      look.title = fmt::format("{} {}", quantity.title, when);
+      look.others = std::move(rigids);
+      return moved_picture(drawn.reference, drawn.displacement, drawn.edges, drawn.values, options.magnify,
+                           std::move(look));
+    }
+    if (options.cut && !cut) {
+      const auto [lower, upper] = bounding_box(drawn.reference);
+      cut = PictureCut{*options.cut, options.cut_at.value_or(options.cut->dot((lower + upper) / 2))};
+    }
+    moments.push_back(moment_of(std::move(drawn), options.magnify, cut));
+    moments.back().others = std::move(rigids);
+    moments.back().when = when;
+  }
+  look.title = quantity.title;
+  look.caption += magnification_text(options.magnify);
+  return moments_picture(moments, look, cut);
 }
 
 }  // namespace tunica::chain

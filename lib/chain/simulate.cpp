@@ -3,6 +3,7 @@
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/accuracy/estimates.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/fit/relax.hpp"
 #include "tunica/io/file/output_file.hpp"
@@ -12,6 +13,7 @@
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"
 #include "tunica/io/scene/scene_file.hpp"
+#include "tunica/io/scene/stated.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 #include "tunica/mechanics/runs/hold_doubts.hpp"
@@ -60,12 +62,49 @@ void warn_of(const fs::path& subject, std::vector<Warning> warnings, const Conte
   }
 }
 
-/// The world axes that the mesh of the first shells says.
-std::string space_of_shells(const Scene& scene, const std::string& otherwise) {
-  return scene.shells.empty()
-             ? otherwise
-             : read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm).space.value_or(otherwise);
+/// Which state it is, below a panel of a picture.
+std::string moment_text(const RunSettings& run, const State& state) {
+  return is_kind<FrequencyRun>(run) ? fmt::format("{:.4g} Hz (of a mode only the shape counts)", state.time)
+         : is_kind<BucklingRun>(run)
+             ? fmt::format("{:.4g} times the load (of a mode only the shape counts)", state.time)
+         : is_kind<DynamicRun>(run) ? fmt::format("{:.4g} s", state.time)
+                                    : fmt::format("load factor {:.4g}", state.load_factor);
 }
+
+/// The states that a picture shows: the nearest to each moment asked for, else the last one, or the first mode.
+class Pictured {
+public:
+  explicit Pictured(const SimulateSettings& settings)
+      : settings_(settings), states_(settings.look.moments.size(), {PicturedState(), infinity}) {}
+
+  void take(const State& state, const ElementFields& fields) {
+    const RunSettings& run = settings_.scene.run;
+    ++count_;
+    const double place = is_modes(run) ? real(count_) : is_kind<DynamicRun>(run) ? state.time : state.load_factor;
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      auto& [nearest, away] = states_[i];
+      const double distance = std::abs(place - settings_.look.moments[i]);
+      if (distance < away) {
+        nearest = {state, fields, moment_text(run, state)};
+        away = distance;
+      }
+    }
+  }
+
+  /// @param last  of the run
+  [[nodiscard]] std::vector<PicturedState> states(PicturedState last) const {
+    std::vector<PicturedState> all;
+    for (const auto& [state, away] : states_) {
+      all.push_back(state);
+    }
+    return all.empty() ? std::vector{std::move(last)} : all;
+  }
+
+private:
+  const SimulateSettings& settings_;
+  std::vector<std::pair<PicturedState, double>> states_;  ///< and how far it is from what was asked for
+  std::size_t count_ = 0;
+};
 
 std::vector<std::string> surface_exports(const Drawing& drawing) {
   std::vector<std::string> endings;
@@ -93,7 +132,8 @@ class Recorder {
 public:
   Recorder(const SimulateSettings& settings, const System& system, const LoadedRun& loaded, RunJournal& journal,
            RunRecord& record, const Context& context)
-      : context_(context),
+      : pictured(settings),
+        context_(context),
         model_(system.model()),
         is_modes_(chain::is_modes(settings.scene.run)),
         record_(record),
@@ -105,7 +145,7 @@ public:
       options.made_by = fmt::format("tunica {}: {}", version,
                                     settings.resume ? context.redact(journal.identity().command) : context.command());
       options.overwrite = context.overwrite || settings.resume;
-      options.space = options.surfaces.empty() ? loaded.space : space_of_shells(settings.scene, loaded.space);
+      options.space = loaded.space.value_or(options.space);
       exports_.emplace(settings.out, model_, options);
     }
   }
@@ -120,6 +160,7 @@ public:
     if (!is_modes_ || !drawn || drawn->first.time == 0) {
       drawn.emplace(state, of_state);
     }
+    pictured.take(state, of_state);
     ended = state;
     if (!is_modes_) {
       crossings_.see(state);
@@ -137,6 +178,7 @@ public:
   [[nodiscard]] const std::optional<Warning>& crossing() const { return crossings_.found(); }
 
   std::optional<std::pair<State, ElementFields>> drawn;  ///< the last state, or the first mode
+  Pictured pictured;
   State ended;
 
 private:
@@ -208,7 +250,8 @@ std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& me
   const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
   require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
   require_near(own, shell.mesh, file, path);
-  loaded.space = common_space(own, shell.mesh, file, path);
+  (void)common_space(own, shell.mesh, file, path);
+  loaded.space = loaded.space ? loaded.space : file.space;
   if (file.voxel) {
     loaded.voxel = std::max(loaded.voxel.value_or(0), shell.scale * *file.voxel);
   }
@@ -364,11 +407,11 @@ Summary solve_and_record(const System& system, const SimulateSettings& settings,
   }
 }
 
-void write_shells(const fs::path& out, const ShellMesh& mesh, const std::string& space, bool partial,
+void write_shells(const fs::path& out, const ShellMesh& mesh, const std::optional<std::string>& space, bool partial,
                   const Context& context) {
   PlyOptions ply;
   ply.comments = {"made by " + context.made_by()};
-  ply.space = space;
+  ply.space = space.value_or(ply.space);
   ply.overwrite = context.overwrite;
   ply.partial = partial;
   write_ply(out, mesh, ply);
@@ -548,6 +591,7 @@ LoadedRun load_run(SimulateSettings& settings, const Context& context) {
   loaded.asked = scene_text(scene, settings.out);
   LoadedScene read = load_scene(scene);
   loaded.model = std::move(read.model);
+  loaded.space = std::move(read.space);
   read_targets(settings, loaded, context);
   std::ranges::for_each(read.notes, context.note);
   std::ranges::for_each(read.warnings, context.warn);
@@ -615,15 +659,16 @@ void simulate(SimulateSettings& settings, LoadedRun loaded, std::optional<RunJou
     require_accuracy(*record.accuracy, settings, journal, context);
   }
   if (settings.unloaded) {
-    loaded.space = space_of_shells(scene, loaded.space);
     write_shells(*settings.unloaded, model.shells.front().mesh, loaded.space, false, context);
   }
   if (settings.picture) {
     const auto& [state, fields] = *recorded.drawn;
     ResultPictureOptions look = settings.look;
-    look.when = when(scene.run, state);
     look.is_unloaded = record.unloaded != nullptr;
-    write_file(*settings.picture, result_picture(model, state, fields, look), context.overwrite);
+    look.caption = stated_line(scene);
+    look.axes = loaded.space.value_or(look.axes);
+    const auto states = recorded.pictured.states({state, fields, when(scene.run, state)});
+    write_file(*settings.picture, result_picture(model, states, look), context.overwrite);
   }
   recorded.commit(record.converged);
   journal.remove();

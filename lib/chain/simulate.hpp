@@ -53,7 +53,7 @@ struct LoadedRun {
   Model model;
   std::vector<std::unique_ptr<Target>> targets;  ///< what each body's shells were fitted to, or none
   std::optional<double> voxel;                   ///< mm, longest edge, of the image behind them
-  std::string space = "LPS";                     ///< world axes of the shells that are written
+  std::optional<std::string> space;              ///< world axes, where a mesh says them
 };
 
 /// Asks the scene for the shells without the pressure of the image. Errors: UsageError: it has none, or several bodies.

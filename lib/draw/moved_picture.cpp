@@ -10,6 +10,11 @@
 
 namespace tunica {
 
+std::string magnification_text(double magnify) {
+  return magnify == 1 ? "Displacements are drawn at their true size"
+                      : fmt::format("Displacements are drawn {:g} times as large", magnify);
+}
+
 std::string moved_picture(const TriangleMesh& reference, const std::vector<Vec3>& displacement,
                           const std::vector<std::array<std::size_t, 2>>& edges, const std::vector<double>& values,
                           double magnify, PictureOptions look) {
@@ -31,8 +36,7 @@ std::string moved_picture(const TriangleMesh& reference, const std::vector<Vec3>
   for (const auto& [from, to] : edges) {
     look.lines.push_back({surface.vertices[from], surface.vertices[to]});
   }
-  look.caption = magnify == 1 ? "Displacements are drawn at their true size"
-                              : fmt::format("Displacements are drawn {:g} times as large", magnify);
+  look.caption += magnification_text(magnify);
   return surface_picture(surface, values, look);
 }
 

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tunica {
 namespace {
@@ -65,49 +66,111 @@ bool turned_inside_out(const TriangleMesh& mesh, const std::vector<Index>& used)
   return volume < 0;
 }
 
+/// One panel.
+struct Shown {
+  const TriangleMesh* surface;
+  const std::vector<double>* values;
+  std::span<const std::array<Vec3, 2>> lines;
+  const TriangleMesh* others;
+  const TriangleMesh* outline;  // or none
+  std::string when = {};
+  View view = {};
+};
+
 // What the views are fitted to. Other bodies may be far larger than the surface: they are cut at half its size around.
-std::vector<Vec3> points_to_see(const TriangleMesh& surface, const std::vector<Index>& used,
-                                const PictureOptions& options) {
+std::vector<Vec3> points_to_see(const std::vector<Shown>& shown, const std::optional<PictureCut>& cut) {
   std::vector<Vec3> points;
+  const auto add = [&](const Vec3& p) {
+    if (!cut || cut->normal.dot(p) <= cut->offset) {
+      points.push_back(p);
+    }
+  };
   Vec3 lower = Vec3::Constant(infinity);
   Vec3 upper = -lower;
-  for (const Index v : used) {
-    points.push_back(surface.vertices[v]);
-    lower = lower.cwiseMin(points.back());
-    upper = upper.cwiseMax(points.back());
-  }
-  const Vec3 around = Vec3::Constant(0.5 * (upper - lower).maxCoeff());
-  for (const TriangleMesh* mesh : {&options.others, &options.outline}) {
-    for (const Vec3& vertex : mesh->vertices) {
-      points.push_back(vertex.cwiseMax(lower - around).cwiseMin(upper + around));
+  for (const Shown& one : shown) {
+    for (const Index v : used_vertices(*one.surface)) {
+      const Vec3& p = one.surface->vertices[v];
+      add(p);
+      lower = lower.cwiseMin(p);
+      upper = upper.cwiseMax(p);
     }
   }
-  return points;
+  const Vec3 around = Vec3::Constant(0.5 * (upper - lower).maxCoeff());
+  for (const Shown& one : shown) {
+    for (const TriangleMesh* mesh : {one.others, one.outline}) {
+      if (mesh != nullptr) {
+        for (const Vec3& vertex : mesh->vertices) {
+          add(vertex.cwiseMax(lower - around).cwiseMin(upper + around));
+        }
+      }
+    }
+  }
+  return points.empty() ? std::vector<Vec3>{lower, upper} : points;
+}
+
+// What of lines is not cut away.
+std::vector<std::array<Vec3, 2>> cut_lines(std::span<const std::array<Vec3, 2>> lines,
+                                           const std::optional<PictureCut>& cut) {
+  std::vector<std::array<Vec3, 2>> left;
+  for (auto [from, to] : lines) {
+    const auto height = [&](const Vec3& p) { return cut ? cut->normal.dot(p) - cut->offset : 0; };
+    if (height(from) > height(to)) {
+      std::swap(from, to);
+    }
+    if (height(from) > 0) {
+      continue;
+    }
+    if (height(to) > 0) {
+      to = from + height(from) / (height(from) - height(to)) * (to - from);
+    }
+    left.push_back({from, to});
+  }
+  return left;
 }
 
 /// The picture that is being drawn.
 class PictureDrawing {
 public:
-  PictureDrawing(const TriangleMesh& surface, const std::vector<double>& values, const PictureOptions& options)
-      : surface_(surface), values_(values), options_(options), canvas_(picture_width, picture_height) {
-    const std::vector<Index> used = used_vertices(surface);
-    for (const Index v : used) {
-      if (!values.empty() && std::isfinite(values[v]) && (!worst_ || values[v] > values[*worst_])) {
-        worst_ = v;
+  PictureDrawing(std::vector<Shown> shown, const PictureOptions& options)
+      : shown_(std::move(shown)), options_(options), canvas_(picture_width, picture_height) {
+    for (const Shown& one : shown_) {
+      const std::vector<double>& values = *one.values;
+      for (const Index v : used_vertices(*one.surface)) {
+        if (!values.empty() && std::isfinite(values[v]) && (worst_among_ == nullptr || values[v] > largest_)) {
+          worst_among_ = &values;
+          worst_at_ = one.surface->vertices[v];
+          largest_ = values[v];
+        }
       }
     }
-    largest_ = worst_ ? std::max(0.0, values[*worst_]) : 0;
-    paint_.plain = values.empty();
-    paint_.inside_out = turned_inside_out(surface, used);
+    largest_ = std::max(0.0, largest_);
+    const TriangleMesh& first = *shown_.front().surface;
+    paint_.plain = shown_.front().values->empty();
+    paint_.inside_out = turned_inside_out(first, used_vertices(first));
     const double step = round_step(0, largest_, most_ticks);
     paint_.top = options.maximum.value_or(step > 0 ? std::ceil(largest_ / step - rounding) * step : largest_);
     const bool headed = !options.title.empty() || !options.caption.empty();
     box_ = {36, headed ? 120.0 : 36.0, paint_.plain ? picture_width - 36.0 : 1310.0, picture_height - 66.0};
-    views_ = opposite_views(points_to_see(surface, used, options), box_, oversampling);
+  }
+
+  /// From two opposite sides; there are two panels.
+  void look_from_both_sides() {
+    const auto views = opposite_views(points_to_see(shown_, {}), box_, oversampling);
+    shown_[0].view = views[0];
+    shown_[1].view = views[1];
+  }
+
+  void look_at_moments(const std::optional<PictureCut>& cut) {
+    const auto views = views_of_moments(points_to_see(shown_, cut), shown_.size(), cut, box_, oversampling);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      shown_[i].view = views[i];
+    }
   }
 
   std::string png() {
-    draw_views();
+    for (const Shown& one : shown_) {
+      draw(one);
+    }
     draw_legend();
     if (!paint_.plain) {
       draw_colour_bar();
@@ -118,35 +181,33 @@ public:
   }
 
 private:
-  void draw_views() {
-    TriangleMesh all = surface_;
+  void draw(const Shown& one) {
+    TriangleMesh all = *one.surface;
     const auto first = narrow<Index>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), options_.others.vertices.begin(), options_.others.vertices.end());
-    for (const auto& [a, b, c] : options_.others.triangles) {
+    all.vertices.insert(all.vertices.end(), one.others->vertices.begin(), one.others->vertices.end());
+    for (const auto& [a, b, c] : one.others->triangles) {
       all.triangles.push_back({first + a, first + b, first + c});
     }
-    std::vector<double> values = values_.empty() ? std::vector<double>(first, 0) : values_;
+    std::vector<double> values = one.values->empty() ? std::vector<double>(first, 0) : *one.values;
     values.resize(all.vertices.size(), std::nan(""));
-    const auto normals = shading_normals(all);
-    const auto outline_normals = shading_normals(options_.outline);
-    for (const View& view : views_) {
-      const double pixel = 1 / view.camera.scale;
-      const Raster raster = rasterise(all, normals, values, view.camera, surface_.triangles.size());
-      Image image = shaded(raster, paint_, 14 * pixel);
-      draw_lines(image, raster, view.camera, options_.lines, 4 * pixel);
-      if (!options_.outline.triangles.empty()) {
-        draw_outline(image, rasterise(options_.outline, outline_normals, {}, view.camera));
-      }
-      canvas_.halved_image(image, truncated<int>(std::round(view.panel.left)),
-                           truncated<int>(std::round(view.panel.top)));
-      if (has_largest()) {
-        ring_largest(view, raster, 6 * pixel);
-      }
-      draw_axes(view);
+    const Camera& camera = one.view.camera;
+    const double pixel = 1 / camera.scale;
+    const Raster raster = rasterise(all, shading_normals(all), values, camera, one.surface->triangles.size());
+    Image image = shaded(raster, paint_, 14 * pixel);
+    draw_lines(image, raster, camera, cut_lines(one.lines, camera.cut), 4 * pixel);
+    if (one.outline != nullptr && !one.outline->triangles.empty()) {
+      draw_outline(image, rasterise(*one.outline, shading_normals(*one.outline), {}, camera));
     }
+    const Box2& panel = one.view.panel;
+    canvas_.halved_image(image, truncated<int>(std::round(panel.left)), truncated<int>(std::round(panel.top)));
+    if (has_largest() && worst_among_ == one.values) {
+      ring_largest(one.view, raster, 6 * pixel);
+    }
+    draw_axes(one.view);
+    canvas_.text(one.when, (panel.left + panel.right) / 2, panel.bottom + 34, letter_size, black, Align::centre);
   }
 
-  [[nodiscard]] bool has_largest() const { return worst_ && largest_ > 0; }
+  [[nodiscard]] bool has_largest() const { return worst_among_ != nullptr && largest_ > 0; }
 
   void ring(double x, double y) {
     canvas_.circle(x, y, 13, 6, white);
@@ -155,7 +216,11 @@ private:
 
   // In a view that shows the place.
   void ring_largest(const View& view, const Raster& raster, double tolerance) {
-    const Vec3 seen = view.camera.project(surface_.vertices[*worst_]);
+    const std::optional<PictureCut>& cut = view.camera.cut;
+    if (cut && cut->normal.dot(worst_at_) > cut->offset) {
+      return;
+    }
+    const Vec3 seen = view.camera.project(worst_at_);
     const auto pixel = [](double place, int size) {
       return truncated<int>(std::clamp(std::floor(place), 0.0, real(size - 1)));
     };
@@ -180,7 +245,7 @@ private:
       const double reach = std::hypot(dx, dy);
       if (reach > 0.3 * length) {
         const double away = (reach + 12) / reach;
-        canvas_.text(std::string(1, "xyz"[i]), x + away * dx, y + away * dy + 7, letter_size, grey, Align::centre);
+        canvas_.text(options_.axes.substr(i, 1), x + away * dx, y + away * dy + 7, letter_size, grey, Align::centre);
       }
     }
   }
@@ -198,7 +263,7 @@ private:
     constexpr double gap = 44;
     const double base = picture_height - 20;
     const double middle = base - 8;
-    const double pixels_per_mm = views_[0].camera.scale / oversampling;
+    const double pixels_per_mm = shown_[0].view.camera.scale / oversampling;
     const double length = round_below(200 / pixels_per_mm);
     double x = box_.left + 4;
     const auto tell = [&](const std::string& text) {
@@ -216,7 +281,7 @@ private:
       x += 26;
       tell("largest: " + with_unit(largest_) + (ringed_ ? "" : ", out of sight"));
     }
-    if (!options_.outline.triangles.empty()) {
+    if (shown_[0].outline != nullptr && !shown_[0].outline->triangles.empty()) {
       canvas_.line(x, middle, x + 36, middle, 3, outline_colour);
       x += 36;
       tell(options_.outline_name);
@@ -262,17 +327,33 @@ private:
 
   static constexpr double bar_left = 1432, bar_right = 1466, bar_top = 250, bar_bottom = 820;
 
-  const TriangleMesh& surface_;
-  const std::vector<double>& values_;
+  std::vector<Shown> shown_;
   const PictureOptions& options_;
   Canvas canvas_;
-  std::optional<Index> worst_;  ///< vertex with the largest value
+  const std::vector<double>* worst_among_ = nullptr;  ///< the values of which the largest is one
+  Vec3 worst_at_ = Vec3::Zero();
   double largest_ = 0;
   bool ringed_ = false;  ///< one of the views shows it
   Paint paint_;
   Box2 box_;
-  std::array<View, 2> views_;
 };
+
+void require_drawable(const std::vector<std::array<Vec3, 2>>& lines) {
+  for (const auto& [from, to] : lines) {
+    if (!from.allFinite() || !to.allFinite()) {
+      throw InputError("a line of the picture has an end that is not finite");
+    }
+  }
+}
+
+void require_valid(const PictureOptions& options) {
+  if (options.diagonal) {
+    require_positive(*options.diagonal, "the diagonal");
+  }
+  if (options.maximum) {
+    require_positive(*options.maximum, "the top of the colour bar");
+  }
+}
 
 }  // namespace
 
@@ -281,18 +362,34 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
   require_drawable(surface, values);
   require_drawable(options.others);
   require_drawable(options.outline);
-  for (const auto& [from, to] : options.lines) {
-    if (!from.allFinite() || !to.allFinite()) {
-      throw InputError("a line of the picture has an end that is not finite");
-    }
+  require_drawable(options.lines);
+  require_valid(options);
+  const Shown shown{&surface, &values, options.lines, &options.others, &options.outline};
+  PictureDrawing drawing({shown, shown}, options);
+  drawing.look_from_both_sides();
+  return drawing.png();
+}
+
+std::string moments_picture(const std::vector<PictureMoment>& moments, const PictureOptions& options,
+                            const std::optional<PictureCut>& cut) {
+  constexpr double rounding_of_units = 1e-9;
+  if (moments.empty()) {
+    throw InputError("a picture of moments needs one at least");
   }
-  if (options.diagonal) {
-    require_positive(*options.diagonal, "the diagonal");
+  if (cut && !(std::abs(cut->normal.norm() - 1) < rounding_of_units && std::isfinite(cut->offset))) {
+    throw InputError("the normal of a cut is no unit vector, or its place not finite");
   }
-  if (options.maximum) {
-    require_positive(*options.maximum, "the top of the colour bar");
+  require_valid(options);
+  std::vector<Shown> shown;
+  for (const PictureMoment& moment : moments) {
+    require_drawable(moment.surface, moment.values);
+    require_drawable(moment.others);
+    require_drawable(moment.lines);
+    shown.push_back({&moment.surface, &moment.values, moment.lines, &moment.others, nullptr, moment.when});
   }
-  return PictureDrawing(surface, values, options).png();
+  PictureDrawing drawing(std::move(shown), options);
+  drawing.look_at_moments(cut);
+  return drawing.png();
 }
 
 std::array<double, 3> bar_colour(double part) {

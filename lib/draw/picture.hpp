@@ -24,6 +24,7 @@ struct PictureOptions {
   TriangleMesh others = {};   ///< drawn grey and from outside only: rigid bodies
   TriangleMesh outline = {};  ///< its outer line is drawn over everything: the unloaded shape
   std::string outline_name = {};
+  std::string axes = "xyz";  ///< a letter for where each axis of the frame points, e.g. LPS
 };
 
 /// Draws a surface, coloured by a value per vertex, from two opposite sides, with a colour bar, a scale of lengths and
@@ -40,16 +41,46 @@ struct PictureOptions {
 std::string surface_picture(const TriangleMesh& surface, const std::vector<double>& values,
                             const PictureOptions& options);
 
+/// What is drawn at one moment.
+struct PictureMoment {
+  TriangleMesh surface;  ///< mm
+  std::vector<double> values;
+  std::vector<std::array<Vec3, 2>> lines;
+  TriangleMesh others;
+  std::string when;  ///< written below it
+};
+
+/// What of the surface lies beyond a plane is not drawn: normal . p > offset.
+struct PictureCut {
+  Vec3 normal;        ///< unit
+  double offset = 0;  ///< mm
+};
+
+/// Adds the faces at which a plane cuts tetrahedra open. @param tetrahedra  between vertices of the moment's surface,
+/// which have values
+void add_section(const PictureCut& cut, const std::vector<std::array<std::size_t, 4>>& tetrahedra,
+                 PictureMoment& moment);
+
+/// Draws moments of a motion or a path from one place, in rows, by one colour bar, which ends at the largest value of
+/// all. What is cut is seen from where the rest was. @return, errors, cost: as surface_picture(); InputError too where
+/// there is no moment, or a normal that is no unit vector.
+/// @param options  lines, others and outline are left out
+std::string moments_picture(const std::vector<PictureMoment>& moments, const PictureOptions& options,
+                            const std::optional<PictureCut>& cut);
+
 /// surface_picture() of a surface that is moved, its edges drawn dark, with the outline of the reference where it
-/// differs visibly. The caption says how many times as large displacements are drawn. Errors: InputError
+/// differs visibly. The caption ends with magnification_text(). Errors: InputError
 /// as surface_picture(), and not one displacement per vertex, an edge without vertices, a magnification that is none.
 /// @param displacement  #V, mm
 /// @param edges         vertices at both ends
 /// @param magnify       > 0: displacements are drawn that many times as large
-/// @param look          the rest: lines, outline and caption are set here
+/// @param look          the rest: lines and outline are set here
 std::string moved_picture(const TriangleMesh& reference, const std::vector<Vec3>& displacement,
                           const std::vector<std::array<std::size_t, 2>>& edges, const std::vector<double>& values,
                           double magnify, PictureOptions look);
+
+/// How many times as large displacements are drawn, for a caption.
+std::string magnification_text(double magnify);
 
 /// To the right, upward, and towards the viewer of the first of surface_picture()'s two views, of points in mm, at
 /// least one: unit vectors. Errors: InputError: none, or one that is not finite.

@@ -44,8 +44,16 @@ std::pair<int, int> pixel_range(double low, double high, int first, int last) {
   return {truncated<int>(from), truncated<int>(to)};
 }
 
-void draw_triangle(Raster& raster, const ProjectedTriangle& triangle, const std::array<Vec3, 3>& normal,
-                   const std::array<double, 3>& value, int first_row, int last_row) {
+/// What is interpolated over a triangle.
+struct AtCorners {
+  std::array<Vec3, 3> normal;  // in the camera's axes
+  std::array<double, 3> value{};
+  std::array<double, 3> beyond{};  // the camera's cut, mm: above zero is not drawn
+};
+
+void draw_triangle(Raster& raster, const ProjectedTriangle& triangle, const AtCorners& at_corners, int first_row,
+                   int last_row) {
+  const auto& [normal, value, beyond] = at_corners;
   const auto& [a, b, c] = triangle.corner;
   const auto [top, bottom] =
       pixel_range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), first_row, last_row);
@@ -61,6 +69,9 @@ void draw_triangle(Raster& raster, const ProjectedTriangle& triangle, const std:
       const double wc = 1 - wa - wb;
       // Borders belong to both neighbours: no crack between them.
       if (wa < 0 || wb < 0 || wc < -1e-12) {
+        continue;
+      }
+      if (wa * beyond[0] + wb * beyond[1] + wc * beyond[2] > 0) {
         continue;
       }
       const std::size_t at = raster.at(x, y);
@@ -167,13 +178,16 @@ Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>
       if (!projected[t].seen || bottom < first || top > last) {
         continue;
       }
-      std::array<Vec3, 3> normal;
-      std::array<double, 3> value{};
+      AtCorners at;
       for (std::size_t i = 0; i < 3; ++i) {
-        normal[i] = to_camera * normals[t][i];
-        value[i] = values.empty() ? 0 : values[mesh.triangles[t][i]];
+        const Index v = mesh.triangles[t][i];
+        at.normal[i] = to_camera * normals[t][i];
+        at.value[i] = values.empty() ? 0 : values[v];
+        if (camera.cut && t < one_sided_from) {
+          at.beyond[i] = camera.cut->normal.dot(mesh.vertices[v]) - camera.cut->offset;
+        }
       }
-      draw_triangle(raster, projected[t], normal, value, first, last);
+      draw_triangle(raster, projected[t], at, first, last);
     }
   });
   return raster;

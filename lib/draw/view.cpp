@@ -99,6 +99,42 @@ std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box
   return best;
 }
 
+std::vector<View> views_of_moments(std::span<const Vec3> points, std::size_t count,
+                                   const std::optional<PictureCut>& cut, const Box2& box, int oversampling) {
+  constexpr double room = 44;  // pixels, for the line below
+  const Side& side = side_of(points);
+  const Vec3 towards = cut ? cut->normal : side.towards;
+  const Vec3 away_from = std::abs(towards.z()) < 0.9 ? Vec3(Vec3::UnitZ()) : Vec3(-Vec3::UnitY());
+  const Vec3 up = cut ? Vec3((away_from - away_from.dot(towards) * towards).normalized()) : side.up;
+  Camera camera = camera_at(up, towards);
+  const Vec2 extent = centre_camera(camera, points);
+  camera.cut = cut;
+  std::size_t columns = 1;
+  double scale = -1;
+  const auto size = [&](std::size_t of_columns) -> Vec2 {
+    const double rows = std::ceil(real(count) / real(of_columns));
+    return {(box.width() + gap) / real(of_columns) - gap, (box.height() + gap) / rows - gap - room};
+  };
+  for (std::size_t n = 1; n <= count; ++n) {
+    const double here = (size(n).array() / extent.array()).minCoeff();
+    if (std::isfinite(here) && here > scale) {
+      scale = here;
+      columns = n;
+    }
+  }
+  const Vec2 panel = size(columns).cwiseMax(1);
+  camera.scale = (scale > 0 ? 0.96 * scale : 1) * oversampling;
+  camera.width = truncated<int>(std::round(panel.x())) * oversampling;
+  camera.height = truncated<int>(std::round(panel.y())) * oversampling;
+  std::vector<View> views;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double left = box.left + real(i % columns) * (panel.x() + gap);
+    const double top = box.top + real(i / columns) * (panel.y() + gap + room);
+    views.push_back({camera, {left, top, left + panel.x(), top + panel.y()}});
+  }
+  return views;
+}
+
 std::array<Vec3, 3> picture_axes(const std::vector<Vec3>& points) {
   constexpr double side = 1000;  // pixels, of each view
   if (points.empty() || !std::ranges::all_of(points, [](const Vec3& p) { return std::isfinite(p.squaredNorm()); })) {

@@ -1,9 +1,11 @@
 #pragma once
 
 #include "tunica/core/narrow.hpp"
+#include "tunica/draw/picture.hpp"
 #include "tunica/surface/mesh/triangle_mesh.hpp"
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 /// A software rasteriser: triangles to layers of depth, value and light, without a window system.
@@ -19,6 +21,7 @@ struct Camera {
   double scale = 1;               ///< pixels per mm
   int width = 0;                  ///< pixels
   int height = 0;
+  std::optional<PictureCut> cut = {};
 
   /// (x in pixels, y in pixels downward, depth towards the viewer in mm).
   [[nodiscard]] Vec3 project(const Vec3& point) const;

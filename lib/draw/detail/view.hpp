@@ -3,7 +3,9 @@
 #include "tunica/draw/detail/rasteriser.hpp"
 
 #include <array>
+#include <optional>
 #include <span>
+#include <vector>
 
 /// From where a surface is looked at.
 namespace tunica {
@@ -29,5 +31,10 @@ Vec2 centre_camera(Camera& camera, std::span<const Vec3> points);
 /// @param points        mm, at least one
 /// @param oversampling  pixels of the cameras per pixel of the box
 std::array<View, 2> opposite_views(std::span<const Vec3> points, const Box2& box, int oversampling);
+
+/// Views from one place, of as many panels in rows as moments are shown, with room below each for a line. Along the
+/// normal of the cut, from where the rest was, or as opposite_views().
+std::vector<View> views_of_moments(std::span<const Vec3> points, std::size_t count,
+                                   const std::optional<PictureCut>& cut, const Box2& box, int oversampling);
 
 }  // namespace tunica

@@ -26,9 +26,6 @@ constexpr std::size_t most_header = std::size_t{16} << 20;
 constexpr std::size_t most_values = 1000;  // of a header: three per state, and some more
 constexpr std::uint64_t most_points = max_index;
 
-// --------------------------------------------------------------------------------------------------------- as it is
-// put
-
 template <typename Number>
 void put(std::string& bytes, Number number) {
   bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
@@ -57,9 +54,7 @@ void put(std::string& bytes, const TriangleMesh& mesh) {
   }
 }
 
-// ---------------------------------------------------------------------------------------------------------- as it is
-// read
-
+/// Takes a page apart, its header first.
 class Reader {
 public:
   explicit Reader(const std::filesystem::path& path) : name_(path.string()), bytes_(read_file(path, most_bytes)) {

@@ -189,7 +189,7 @@ constexpr std::array about{
     About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, passed on 1 % of the area"},
     About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, passed on 1 % of the area"},
     About{"tunica/history/stress_max", "MPa", "largest von Mises stress of either face"},
-    About{"tunica/history/stress_max_at", "mm", "the node where it is, reference"},
+    About{"tunica/history/stress_max_at", "mm", "where it is, reference"},
     About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
     About{"tunica/history/strain_max", "%", "largest principal strain of either face"}};
 

@@ -27,11 +27,6 @@ Json known(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json triple(const Vec3& v) { return Json::array({known(v.x()), known(v.y()), known(v.z())}); }
 
-template <typename Value>
-Json or_null(const std::optional<Value>& value) {
-  return value ? Json(*value) : Json();
-}
-
 Json list_of_when(const std::vector<RunRecord::When>& when, bool is_motion) {
   Json record{{"time_s", Json::array()}, {"load_factor", Json::array()}};
   for (const RunRecord::When& one : when) {
@@ -508,7 +503,8 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
                         "all of the wall lies within two bending lengths sqrt(R t) of rims, supports, point loads or "
                         "jumps of the thickness, so nothing of it is left out of the numbers of the wall"});
   }
-  if (wall.is_max_on_held) {
+  constexpr double notable = 1.05;
+  if (wall.is_max_on_held && wall.whole.stress_max > notable * wall.whole.stress_p99) {
     warnings.push_back({Weight::note, "largest stress at a support",
                         fmt::format("the largest stress of the whole wall, {}, lies on a held rim or another support, "
                                     "and says more of the support than of the organ",

@@ -289,7 +289,8 @@ LoadedScene load_scene(const Scene& scene) {
   for (const SceneRigid& rigid : scene.rigids) {
     bodies.rigids.push_back(load_rigid(rigid, found));
   }
-  LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings)};
+  LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings),
+                     found.space};
   warn_of_far_points(scene, loaded.model, loaded.warnings);
   std::vector<bool> is_looked_at(loaded.model.shells.size(), false);
   for (const Load& load : loaded.model.loads) {

@@ -202,8 +202,9 @@ bool holds_for_finer_meshes(const Scene& scene);
 
 struct LoadedScene {
   Model model;
-  std::vector<std::string> notes;  ///< of the scene and of its meshes (flat facets)
-  std::vector<Warning> warnings;   ///< of its meshes: which way they face, where they are open unawares
+  std::vector<std::string> notes;    ///< of the scene and of its meshes (flat facets)
+  std::vector<Warning> warnings;     ///< of its meshes: which way they face, where they are open unawares
+  std::optional<std::string> space;  ///< world axes, of the first mesh that says them
 };
 
 /// The meshes of a scene at hand: shells, solids and rigid bodies each in the scene's order.

@@ -1,7 +1,10 @@
 #include "tunica/io/scene/stated.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <cctype>
+#include <set>
 #include <string>
 
 namespace tunica {
@@ -25,9 +28,15 @@ Json known_or_null(const std::optional<double>& value, double scale = 1) {
   return value ? Json(scale * *value) : Json();
 }
 
-Json typed(const Places& places, std::string_view key) {
+// As the user wrote it; empty: not known.
+std::string text_of(const Places& places, std::string_view key) {
   const auto place = places.keys.find(key);
-  return place == places.keys.end() || place->second.typed.empty() ? Json() : Json(place->second.typed);
+  return place == places.keys.end() ? "" : place->second.typed;
+}
+
+Json typed(const Places& places, std::string_view key) {
+  const std::string text = text_of(places, key);
+  return text.empty() ? Json() : Json(text);
 }
 
 struct NameOfRegion {
@@ -105,6 +114,47 @@ Json stated_inputs(const Scene& scene) {
   written["duration"] = typed(scene.run_places, "duration");
   written["step"] = typed(scene.run_places, "step");
   return stated;
+}
+
+std::string stated_line(const Scene& scene) {
+  std::vector<std::string> parts;
+  const auto say = [&](const char* name, const std::set<std::string>& values) {
+    if (values.size() == 1 && !values.begin()->empty()) {
+      parts.push_back(fmt::format("{} {}", name, *values.begin()));
+    }
+  };
+  std::set<std::string> pressures;
+  std::set<std::string> imaged;
+  std::set<std::string> others;
+  for (const SceneLoad& load : scene.loads) {
+    if (std::holds_alternative<PressureLoad>(load.kind)) {
+      pressures.insert(text_of(load.places, "value"));
+      imaged.insert(text_of(load.places, "imaged_at"));
+    } else {
+      others.emplace(name_of(load.kind));
+    }
+  }
+  say("pressure", pressures);
+  say("imaged at", imaged);
+  if (!others.empty()) {
+    parts.push_back(fmt::format("{}", fmt::join(others, ", ")));
+  }
+  const auto of_shells = [&](const auto& value) {
+    std::set<std::string> values;
+    for (const SceneShell& shell : scene.shells) {
+      values.insert(value(shell));
+    }
+    return values;
+  };
+  say("wall", of_shells([](const SceneShell& shell) { return text_of(shell.places, "thickness"); }));
+  say("E", of_shells([](const SceneShell& shell) { return text_of(shell.places, "young"); }));
+  say("Poisson's ratio",
+      of_shells([](const SceneShell& shell) { return fmt::format("{:g}", shell.material.poisson); }));
+  std::string line = fmt::format("{}", fmt::join(parts, ", "));
+  if (!line.empty()) {
+    line.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(line.front())));
+  }
+  return line;
 }
 
 }  // namespace tunica

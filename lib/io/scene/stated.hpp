@@ -11,4 +11,8 @@ namespace tunica {
 /// null.
 Json stated_inputs(const Scene& scene);
 
+/// Loads and wall in a line, as the user wrote them: "Pressure 120mmHg, wall 1.5mm, E 1MPa, Poisson's ratio 0.45". What
+/// differs from body to body is left out.
+std::string stated_line(const Scene& scene);
+
 }  // namespace tunica

@@ -1,4 +1,3 @@
-// mechanics/contact: what touches, and what carries what, through the map from nodes to the curved surface.
 #pragma once
 
 #include "tunica/mechanics/algebra/block_matrix.hpp"

@@ -120,7 +120,7 @@ bool stay_apart(const SurfaceFace& face, const PatchMap& a0, const PatchMap& a1,
 }  // namespace
 
 bool ContactSystem::is_certain(const Configuration& configuration) {
-  if (std::any_of(smallest_gap_.begin(), smallest_gap_.end(), [](double gap) { return gap <= 0; })) {
+  if (std::ranges::any_of(barriers_, &Barrier::overlaps)) {
     return false;
   }
   const auto kept = maps_at(configuration);

@@ -231,17 +231,13 @@ struct ContactSystem::Acting {
 ContactSystem::Press ContactSystem::press(const Group& group, const Sample& sample, const Touch& t, const Vec3& x,
                                           const FaceMaps& maps) const {
   const double friction = contacts_[group.contact].friction;
-  const double barrier = stiffness_[group.contact];
-  const double s = std::max(t.gap / group.resolution, straight_below);
-  const double straight = barrier * (1 / (s * s) - 1);  // the derivative there
+  const Barrier& barrier = barriers_[group.contact];
   Press press;
-  press.law = barrier * (1 - s) * (1 - s) / s + (s - t.gap / group.resolution) * straight;
+  press.law = barrier.pressure(t.gap, group.resolution);
   const double expected = sample.pressure < 0 ? press.law
                                               : std::clamp(sample.pressure, press.law / largest_expectation,
                                                            press.law * largest_expectation);
-  // The derivative of the law on its straight part; else that of p g = const (1 - g / d)^2 at the pressure expected.
-  press.slope = t.gap < straight_below * group.resolution ? straight / group.resolution
-                                                          : (expected + 2 * barrier * (1 - s)) / t.gap;
+  press.slope = barrier.slope(t.gap, group.resolution, expected);
   const Vec3& n = t.normal;
   press.traction = press.law * n;
   press.derivative = press.slope * n * n.transpose() - press.law * t.curvature;
@@ -258,16 +254,6 @@ ContactSystem::Press ContactSystem::press(const Group& group, const Sample& samp
     press.derivative += friction * (expected / length * of_slip - press.slope * direction * n.transpose());
   }
   return press;
-}
-
-double ContactSystem::potential(const Group& group, const Touch& t) const {
-  const double d = group.resolution;
-  const double gap = t.gap / d;
-  const double s = std::max(gap, straight_below);
-  const double below = s - gap;
-  const double law = (1 - s) * (1 - s) / s;
-  return stiffness_[group.contact] * d *
-         (-std::log(s) - 1.5 + 2 * s - s * s / 2 + below * (law + below / 2 * (1 / (s * s) - 1)));
 }
 
 /// What the rest of the rigid body's motion adds to a traction: as if the surface moved back by that.
@@ -421,10 +407,8 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
   const auto kept = maps_at(configuration);
   const FaceMaps& maps = *kept;
   const auto touches = all_touches(maps, near_faces(maps, 0));
-  largest_pressure_.assign(contacts_.size(), 0);
-  potential_.assign(contacts_.size(), 0);
+  std::ranges::for_each(barriers_, &Barrier::begin);
   slides_ = false;
-  smallest_gap_.assign(contacts_.size(), infinity);
   closest_ = {};
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
@@ -443,11 +427,10 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       if (t.gap < -deepest(group, t.face)) {
         return false;
       }
-      smallest_gap_[group.contact] = std::min(smallest_gap_[group.contact], t.gap);
       const Vec3 x = place(group, sample, maps);
       const Press here = press(group, sample, t, x, maps);
-      largest_pressure_[group.contact] = std::max(largest_pressure_[group.contact], here.law);
-      potential_[group.contact] += group.weight * sample.area * potential(group, t);
+      Barrier& barrier = barriers_[group.contact];
+      barrier.press(t.gap, here.law, barrier.energy(t.gap, group.resolution), group.weight * sample.area);
       if (recorded_ != nullptr) {
         record(group, sample, maps, t, here);
       }

@@ -15,18 +15,6 @@
 namespace tunica {
 namespace {
 
-constexpr double first_stiffness = 1e-5;  // of the barrier, of Young's modulus, while no pressure is known
-constexpr double least_stiffness = 1e-8;  // of the barrier, of Young's modulus: where a contact opens
-/// Barrier's stiffness over the largest pressure that takes just that part of the resolution below which the law is
-/// straight.
-constexpr double stiffness_of_pressure =
-    ContactSystem::straight_below / ((1 - ContactSystem::straight_below) * (1 - ContactSystem::straight_below));
-/// Energy of the barrier per area down to where the law is straight, over its stiffness and the resolution: the
-/// integral of (1 - s)^2 / s from there to 1.
-const double energy_of_stiffness = -std::log(ContactSystem::straight_below) - 1.5 + 2 * ContactSystem::straight_below -
-                                   ContactSystem::straight_below * ContactSystem::straight_below / 2;
-constexpr double blunt = 2;               // of what is wanted: above, the barrier is made softer
-constexpr double largest_hardening = 10;  // of the barrier at a time: pressures of iterates may be far too large
 /// Part of both half walls up to which shells may overlap on the way.
 constexpr double largest_overlap = 0.8;
 constexpr double elastic_slip_of_wall = 1e-3;  // slip at which friction is fully there
@@ -136,13 +124,7 @@ void ContactSystem::make_sides(const Model& model) {
       wall = party.rigid ? wall : std::min(wall, walls[party.index]);
       mass = party.rigid ? mass : std::max(mass, density_of(party.index) * walls[party.index]);
     }
-    young_.push_back(young);
-    braking_.push_back(mass / (2 * energy_of_stiffness * contact.resolution * wall));
-    stiffness_.push_back(first_stiffness * young);
-    accepted_stiffness_.push_back(stiffness_.back());
-    for (std::vector<double>* unknown : {&largest_pressure_, &pressed_, &least_, &potential_, &accepted_potential_}) {
-      unknown->push_back(0);
-    }
+    barriers_.emplace_back(young, mass, contact.resolution * wall);
     for (std::size_t k = 0; k < (self ? 1 : 2); ++k) {
       const ContactParty &own = contact.between[k], &other = contact.between[1 - k];
       if (own.rigid && shapes_[own.index].convex()) {
@@ -367,46 +349,56 @@ void ContactSystem::refine(Group& group) const {
   group.sag = bend / (group.level * group.level);
 }
 
-double ContactSystem::sum_of(const std::vector<double>& values) { return std::reduce(values.begin(), values.end()); }
-
 void ContactSystem::brace(const std::vector<double>& speeds, double length) {
   for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (accepted_potential_[c] > 0) {
-      continue;
-    }
     double speed = 0;
     for (const ContactParty& party : contacts_[c].between) {
       speed += party.rigid
                    ? (shapes_end_[party.index].position() - shapes_before_[party.index].position()).norm() / length
                    : speeds[party.index];
     }
-    least_[c] = braking_[c] * speed * speed;
-    stiffness_[c] = std::max(stiffness_[c], least_[c]);
+    barriers_[c].brace(speed);
   }
 }
 
 bool ContactSystem::harden() {
   bool changed = false;
-  for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    if (smallest_gap_[c] <= 0) {
-      stiffness_[c] = std::min(stiffness_of_pressure * largest_pressure_[c], largest_hardening * stiffness_[c]);
-      changed = true;
-    }
+  for (Barrier& barrier : barriers_) {
+    changed = barrier.harden() || changed;
   }
   return changed;
 }
 
 bool ContactSystem::sharpen() {
-  bool changed = harden();
-  for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    const double wanted =
-        std::max({stiffness_of_pressure * largest_pressure_[c], least_stiffness * young_[c], least_[c]});
-    if (largest_pressure_[c] > 0 && stiffness_[c] > blunt * wanted) {
-      stiffness_[c] = wanted;
-      changed = true;
-    }
+  bool changed = false;
+  for (Barrier& barrier : barriers_) {
+    changed = barrier.sharpen() || changed;
   }
   return changed;
+}
+
+double ContactSystem::potential() const {
+  double sum = 0;
+  for (const Barrier& barrier : barriers_) {
+    sum += barrier.potential();
+  }
+  return sum;
+}
+
+double ContactSystem::accepted_potential() const {
+  double sum = 0;
+  for (const Barrier& barrier : barriers_) {
+    sum += barrier.accepted().potential;
+  }
+  return sum;
+}
+
+std::vector<double> ContactSystem::pressed() const {
+  std::vector<double> pressed;
+  for (const Barrier& barrier : barriers_) {
+    pressed.push_back(barrier.accepted().pressed);
+  }
+  return pressed;
 }
 
 double ContactSystem::offset(const Group& group, std::size_t other) const {
@@ -562,7 +554,7 @@ ContactSystem::Touch ContactSystem::touch(const Group& group, const Vec3& x, con
 }
 
 void ContactSystem::set_step(double from, double to, const Configuration& configuration) {
-  stiffness_ = accepted_stiffness_;
+  std::ranges::for_each(barriers_, &Barrier::go_back);
   std::ranges::for_each(groups_, let_sleep);
   std::erase_if(groups_, [](const Group& group) { return group.other.rigid && group.samples.empty(); });
   refine(*maps_at(configuration));
@@ -626,18 +618,14 @@ void ContactSystem::accept(const Configuration& configuration) {
   }
   accepted_ = maps_at(configuration);
   shapes_before_ = shapes_;
-  for (std::size_t c = 0; c < contacts_.size(); ++c) {
-    hardening_ += accepted_potential_[c] * (stiffness_[c] / accepted_stiffness_[c] - 1);
+  for (Barrier& barrier : barriers_) {
+    hardening_ += barrier.accept();
   }
-  accepted_potential_ = potential_;
-  accepted_stiffness_ = stiffness_;
-  std::ranges::transform(pressed_, largest_pressure_, pressed_.begin(),
-                         [](double a, double b) { return std::max(a, b); });
 }
 
 void ContactSystem::go_back() {
   shapes_ = shapes_before_;
-  stiffness_ = accepted_stiffness_;
+  std::ranges::for_each(barriers_, &Barrier::go_back);
   left_ = 0;
 }
 
@@ -689,9 +677,10 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 }
 
 std::vector<double> ContactSystem::memory() const {
-  std::vector<double> values = accepted_stiffness_;
-  for (const std::vector<double>* kept : {&pressed_, &least_, &accepted_potential_}) {
-    values.insert(values.end(), kept->begin(), kept->end());
+  std::vector<double> values;
+  for (const Barrier& barrier : barriers_) {
+    const auto& [stiffness, least, potential, pressed] = barrier.accepted();
+    values.insert(values.end(), {stiffness, least, potential, pressed});
   }
   values.push_back(real(pairs_.size()));
   for (const auto& [i, j] : pairs_) {
@@ -726,11 +715,14 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
     }
     return memory[read++];
   };
-  std::ranges::generate(accepted_stiffness_, next);
-  stiffness_ = accepted_stiffness_;
-  for (std::vector<double>* kept : {&pressed_, &least_, &accepted_potential_}) {
-    std::ranges::generate(*kept, next);
+  for (Barrier& barrier : barriers_) {
+    Barrier::Memory accepted;
+    for (double* kept : {&accepted.stiffness, &accepted.least, &accepted.potential, &accepted.pressed}) {
+      *kept = next();
+    }
+    barrier.recall(accepted);
   }
+  hardening_ = 0;
   std::vector<std::array<Index, 2>> pairs(truncated<std::size_t>(next()));
   for (auto& [i, j] : pairs) {
     i = truncated<Index>(next());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "tunica/mechanics/algebra/block_matrix.hpp"
+#include "tunica/mechanics/contact/barrier.hpp"
 #include "tunica/mechanics/contact/carried.hpp"
 #include "tunica/mechanics/contact/contact_state.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
@@ -45,9 +46,6 @@ class FaceMaps;
 
 class ContactSystem : public ChangingLaw {
 public:
-  /// Part of the resolution below which the law goes on as a straight line, also where surfaces overlap on the way.
-  static constexpr double straight_below = 0.05;
-
   /// Errors: InputError: bodies overlap in the reference; names the pair and the depth.
   /// @param carried  nodes do not touch the body that carries them
   ContactSystem(const Model& model, Surfaces surfaces, std::vector<Vec3> reference,
@@ -123,11 +121,11 @@ public:
   [[nodiscard]] std::array<double, 2> imbalance() const { return imbalance_; }
 
   /// Per contact the largest pressure of any accepted state so far, also of those within a step, MPa.
-  [[nodiscard]] const std::vector<double>& pressed() const { return pressed_; }
+  [[nodiscard]] std::vector<double> pressed() const;
 
   /// mJ, of the barrier at the last forces.
-  [[nodiscard]] double potential() const { return sum_of(potential_); }
-  [[nodiscard]] double accepted_potential() const { return sum_of(accepted_potential_); }
+  [[nodiscard]] double potential() const;
+  [[nodiscard]] double accepted_potential() const;  ///< at those of the last accepted state
   /// mJ, that changes of the barrier's stiffness have brought in since this was asked for last: they act on what was
   /// pressing before.
   double take_hardening() { return std::exchange(hardening_, 0); }
@@ -213,7 +211,6 @@ private:
     Vec3 own = Vec3::Zero(), other = Vec3::Zero();
   };
 
-  static double sum_of(const std::vector<double>& values);
   [[nodiscard]] std::shared_ptr<const FaceMaps> maps_at(const Configuration& configuration);
 
   void make_sides(const Model& model);
@@ -272,8 +269,6 @@ private:
   struct Acting;
   [[nodiscard]] Press press(const Group& group, const Sample& sample, const Touch& touch, const Vec3& x,
                             const FaceMaps& maps) const;
-  /// mJ/mm^2, the integral of the law from this gap on.
-  [[nodiscard]] double potential(const Group& group, const Touch& touch) const;
   [[nodiscard]] Vec3 rest_of_motion(const Group& group, const Press& press, const Touch& touch, const Vec3& x) const;
   struct Recorded {
     std::vector<ContactState> states;
@@ -314,24 +309,15 @@ private:
   std::map<std::size_t, double> thickest_;                 ///< mm, half walls, of these
   std::vector<std::array<double, 2>> bends_;  ///< mm, per face at the last refine(): its bend, its longest side
   double resolution_ = infinity;              ///< mm, the smallest
-  std::vector<double> young_;                 ///< MPa, per contact, of the softer body
-  std::vector<double> stiffness_;             ///< MPa, per contact, of the barrier
-  std::vector<double> accepted_stiffness_;    ///< of the last accepted state
-  std::vector<double> braking_;  ///< MPa s^2/mm^2, per contact: the stiffness that stops the heavier wall, by its speed
-  std::vector<double> least_;    ///< MPa, per contact, of the barrier while it presses
-  std::vector<double> potential_;           ///< mJ, per contact, of the last forces
-  std::vector<double> accepted_potential_;  ///< of the last accepted state
-  double hardening_ = 0;                    ///< mJ
+  std::vector<Barrier> barriers_;             ///< of the contacts
+  double hardening_ = 0;                      ///< mJ
   bool is_driven_ = false;
-  std::vector<double> smallest_gap_;  ///< mm, per contact, of the samples at the last forces
   struct Closest {
     double gap = infinity;
     std::size_t contact = 0;
     Vec3 at = Vec3::Zero();
   };
-  Closest closest_;                       ///< at the last forces
-  std::vector<double> largest_pressure_;  ///< MPa, per contact, of the last forces
-  std::vector<double> pressed_;           ///< MPa, per contact, of all accepted states
+  Closest closest_;  ///< at the last forces
   std::vector<std::array<Index, 2>> pairs_;
   bool pairs_are_new_ = false;  ///< nobody has asked yet
   const Configuration rest_;

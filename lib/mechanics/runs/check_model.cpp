@@ -635,7 +635,7 @@ ShellSystem& System::parts() const {
 }
 
 std::optional<double> System::prestress_residual() const { return parts().prestress_residual; }
-std::optional<bool> System::rests_as_imaged() const { return parts().rests_as_imaged; }
+std::optional<bool> System::rests_as_imaged() const { return tunica::rests_as_imaged(parts(), settings()); }
 
 void check_model(const Model& model, const RunSettings& settings) { (void)make_checked_system(model, settings); }
 

@@ -25,40 +25,96 @@ constexpr double step = 1.25;      // of the thickness within a shell, from whic
 constexpr double layers = 2;       // bending lengths, within which stress is that of what disturbs it
 constexpr double flattest = 1e-6;  // curvature times the body's diagonal, below which it is round-off
 
+/// How the wall curves at places: the mean of what its shells do within two walls of them. Shells finer than that may
+/// follow the facets of the surface that they were fitted to, whose bends are not the wall's.
+class CurvatureOfWall {
+public:
+  explicit CurvatureOfWall(const ShellBody& body)
+      : body_(body),
+        facets_(flat_facets(body.mesh)),
+        around_(incidence(facets_)),
+        shapes_(shape_operators_of(body.mesh, body.curved)) {
+    for (const auto& [i, j, k] : facets_.triangles) {
+      const auto& v = facets_.vertices;
+      areas_.push_back((v[j] - v[i]).cross(v[k] - v[i]).norm() / 2);
+    }
+  }
+
+  [[nodiscard]] double thickness_at(Index node) const {
+    return body_.thickness[body_.thickness.size() == 1 ? 0 : node];
+  }
+  /// mm^2, of the shells around a node.
+  [[nodiscard]] double area_at(Index node) const {
+    double area = 0;
+    for (const Index t : around_.of(node)) {
+      area += areas_[t];
+    }
+    return area;
+  }
+  /// 1/mm, the larger of the principal ones.
+  [[nodiscard]] double largest_at(Index node) const {
+    const double reach = within * thickness_at(node);
+    std::set<Index> seen{node};
+    std::vector<Index> next{node};
+    std::set<Index> shells;
+    while (!next.empty()) {
+      const Index at = next.back();
+      next.pop_back();
+      for (const Index t : around_.of(at)) {
+        shells.insert(t);
+        for (const Index other : facets_.triangles[t]) {
+          if ((facets_.vertices[other] - facets_.vertices[node]).norm() < reach && seen.insert(other).second) {
+            next.push_back(other);
+          }
+        }
+      }
+    }
+    double area = 0;
+    Mat3 shape = Mat3::Zero();
+    for (const Index t : shells) {
+      area += areas_[t];
+      shape += areas_[t] * shapes_[t];
+    }
+    return area > 0 ? Eigen::SelfAdjointEigenSolver<Mat3>(shape / area).eigenvalues().cwiseAbs().maxCoeff() : 0;
+  }
+
+private:
+  static constexpr double within = 2;  // thicknesses
+  const ShellBody& body_;
+  TriangleMesh facets_;
+  Incidence around_;
+  std::vector<Mat3> shapes_;
+  std::vector<double> areas_;
+};
+
 /// Per node of a body, the bending length of what it belongs to where it is disturbed, else 0.
 std::vector<double> bending_lengths(const Model& model, std::size_t b) {
   const ShellBody& body = model.shells[b];
-  const auto& triangles = body.mesh.triangles;
   const std::vector<std::uint8_t> disturbed = disturbed_nodes(model, b);
   std::vector<double> lengths(disturbed.size(), 0);
   if (std::ranges::find(disturbed, 1) == disturbed.end()) {
     return lengths;
   }
-  const TriangleMesh facets = flat_facets(body.mesh);
-  const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
   DisjointSets<> together(disturbed.size());
-  for (const auto& t : triangles) {
+  for (const auto& t : body.mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (disturbed[t[k]] != 0 && disturbed[t[(k + 1) % 3]] != 0) {
         together.join(t[k], t[(k + 1) % 3]);
       }
     }
   }
-  std::vector<double> area(disturbed.size(), 0), curvature(area), thickness(area);  // sums over the shells around
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const auto& [i, j, k] = triangles[t];
-    const auto& v = facets.vertices;
-    const double of_shell = (v[j] - v[i]).cross(v[k] - v[i]).norm() / 2;
-    for (const Index node : triangles[t]) {
-      if (disturbed[node] != 0) {
-        const Index root = together.root(node);
-        area[root] += of_shell;
-        curvature[root] += of_shell * curvatures[t].largest;
-        thickness[root] += of_shell * body.thickness[body.thickness.size() == 1 ? 0 : node];
-      }
+  const CurvatureOfWall wall(body);
+  std::vector<double> area(disturbed.size(), 0), curvature(area), thickness(area);  // sums over what hangs together
+  for (Index node = 0; node < disturbed.size(); ++node) {
+    if (disturbed[node] != 0) {
+      const Index root = together.root(node);
+      const double own = wall.area_at(node);
+      area[root] += own;
+      curvature[root] += own * wall.largest_at(node);
+      thickness[root] += own * wall.thickness_at(node);
     }
   }
-  const double straight = flattest / diagonal(facets);
+  const double straight = flattest / diagonal(flat_facets(body.mesh));
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const Index root = together.root(narrow<Index>(i));
     if (disturbed[i] != 0 && curvature[root] > straight * area[root]) {
@@ -68,15 +124,25 @@ std::vector<double> bending_lengths(const Model& model, std::size_t b) {
   return lengths;
 }
 
-/// Distances of a body's nodes along its edges from those that have a length, in these lengths; infinite beyond.
-std::vector<double> scaled_distances(const ShellMesh& mesh, std::vector<double> lengths) {
-  std::vector<std::vector<Index>> beside(lengths.size());
-  for (const auto& t : mesh.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      beside[t[k]].push_back(t[(k + 1) % 3]);
-      beside[t[(k + 1) % 3]].push_back(t[k]);
-    }
+/// How far a front has come at the third corner of a facet, where it passed the others at these distances and its speed
+/// is 1; infinite where it comes to it from outside the facet (Kimmel and Sethian 1998).
+double front_at(const Vec3& corner, const Vec3& a, double at_a, const Vec3& b, double at_b) {
+  const Vec3 edge = b - a;
+  const double length = edge.norm();
+  const double x = edge.dot(corner - a) / length;
+  const double y = (corner - a - x / length * edge).norm();
+  const double along = (at_b - at_a) / length;
+  if (!(std::abs(along) < 1)) {
+    return infinity;
   }
+  const double ahead = std::sqrt(1 - along * along);
+  const double from = x - y * along / ahead;  // of the edge, where it came through
+  return from >= 0 && from <= length ? at_a + along * x + ahead * y : infinity;
+}
+
+/// Distances of a body's nodes along its facets from those that have a length, in these lengths; infinite beyond.
+std::vector<double> scaled_distances(const ShellMesh& mesh, std::vector<double> lengths) {
+  const Incidence around = incidence(lengths.size(), mesh.triangles);
   std::vector<double> distances(lengths.size(), infinity);
   std::priority_queue<std::pair<double, Index>, std::vector<std::pair<double, Index>>, std::greater<>> next;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
@@ -91,16 +157,52 @@ std::vector<double> scaled_distances(const ShellMesh& mesh, std::vector<double> 
     if (distance > distances[node]) {
       continue;
     }
-    for (const Index other : beside[node]) {
-      const double there = distance + (mesh.vertices[other] - mesh.vertices[node]).norm() / lengths[node];
-      if (there < distances[other]) {
+    const double length = lengths[node];
+    const auto at = [&](Index v) -> Vec3 { return mesh.vertices[v] / length; };
+    const auto reach = [&](Index other, Index beside) {
+      const double along_edge = distance + (at(other) - at(node)).norm();
+      const double across = distances[beside] < infinity
+                                ? front_at(at(other), at(node), distance, at(beside), distances[beside])
+                                : infinity;
+      if (const double there = std::min(along_edge, across); there < distances[other]) {
         distances[other] = there;
-        lengths[other] = lengths[node];
+        lengths[other] = length;
         next.emplace(there, other);
       }
+    };
+    for (const Index t : around.of(node)) {
+      const auto& corners = mesh.triangles[t];
+      const std::size_t k = std::ranges::find(corners, node) - corners.begin();
+      reach(corners[(k + 1) % 3], corners[(k + 2) % 3]);
+      reach(corners[(k + 2) % 3], corners[(k + 1) % 3]);
     }
   }
   return distances;
+}
+
+/// Adds what of a shell lies at `layers` and beyond. @param d  at its corners, linear between them
+void add_far_part(std::size_t shell, const std::array<double, 3>& d, std::vector<ShellPart>& parts) {
+  const Mat3 corners = Mat3::Identity();
+  const auto far = std::ranges::count_if(d, [](double at) { return at >= layers; });
+  if (far == 0 || std::ranges::min(d) == 0) {
+    return;
+  }
+  if (far == 3) {
+    parts.push_back({shell, {corners.col(0), corners.col(1), corners.col(2)}});
+    return;
+  }
+  // The corner that is alone on its side.
+  const std::size_t a = std::ranges::find_if(d, [&](double at) { return (at >= layers) == (far == 1); }) - d.begin();
+  const std::size_t b = (a + 1) % 3, c = (a + 2) % 3;
+  const auto border = [&](std::size_t to) -> Vec3 {
+    return corners.col(a) + (layers - d[a]) / (d[to] - d[a]) * (corners.col(to) - corners.col(a));
+  };
+  if (far == 1) {
+    parts.push_back({shell, {corners.col(a), border(b), border(c)}});
+  } else {
+    parts.push_back({shell, {border(b), corners.col(b), corners.col(c)}});
+    parts.push_back({shell, {border(b), corners.col(c), border(c)}});
+  }
 }
 
 }  // namespace
@@ -195,18 +297,18 @@ std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
   return disturbed;
 }
 
-std::vector<std::uint8_t> near_disturbances(const Model& model) {
+std::vector<ShellPart> far_from_disturbances(const Model& model) {
   require_valid(model);
-  std::vector<std::uint8_t> near;
+  std::vector<ShellPart> parts;
+  std::size_t shell = 0;
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellMesh& mesh = model.shells[b].mesh;
     const std::vector<double> distances = scaled_distances(mesh, bending_lengths(model, b));
     for (const auto& [i, j, k] : mesh.triangles) {
-      const double least = std::min({distances[i], distances[j], distances[k]});
-      near.push_back((distances[i] + distances[j] + distances[k]) / 3 < layers || least == 0 ? 1 : 0);
+      add_far_part(shell++, {distances[i], distances[j], distances[k]}, parts);
     }
   }
-  return near;
+  return parts;
 }
 
 }  // namespace tunica

@@ -2,6 +2,8 @@
 
 #include "tunica/mechanics/model/model.hpp"
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -28,10 +30,19 @@ bool is_step(const ShellBody& body, std::size_t triangle);
 /// Errors: InputError: as require_valid(), no such body. Cost: linear.
 std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t body);
 
-/// Shells of all bodies in order (0 or 1) whose middle is within two bending lengths sqrt(R t) of such nodes, along the
-/// edges: there a layer of e^(-2 x 1.24) of its height is left. R is the smaller radius of curvature in the mean over
-/// the shells around the nodes that hang together, as a rim does, t the thickness there; flat shells have no layer.
-/// Errors: InputError as require_valid(). Cost: n log n.
-std::vector<std::uint8_t> near_disturbances(const Model& model);
+/// A triangle within a shell; the shells of all bodies are numbered in order.
+struct ShellPart {
+  std::size_t shell = 0;
+  std::array<Vec3, 3> corners;  ///< in the shell's barycentric coordinates
+
+  /// Of the shell's area.
+  [[nodiscard]] double share() const { return std::abs(corners[0].dot(corners[1].cross(corners[2]))); }
+};
+
+/// What of the shells lies farther than two bending lengths sqrt(R t) from such nodes, along the facets: there a layer
+/// of e^(-2 x 1.24) of its height is left. R is the smaller radius of curvature, of the wall within two thicknesses of
+/// a node, in the mean over nodes that hang together, as a rim does, t the thickness there; flat shells have no layer.
+/// Of a shell with such a node nothing is far. Errors: InputError as require_valid(). Cost: n log n.
+std::vector<ShellPart> far_from_disturbances(const Model& model);
 
 }  // namespace tunica

@@ -384,7 +384,7 @@ bool is_zero(const Load& load) {
   return shared(load)->value.isZero(0);
 }
 
-// Whether a ramp is zero wherever the run looks: it is linear between its points.
+// Whether a ramp is zero in all states of the run; of a motion it is linear between its points.
 bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
   std::vector<double> times;
   if (const auto* dynamic = std::get_if<DynamicRun>(&settings.kind)) {
@@ -396,11 +396,6 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
     }
   } else if (const auto* statics = std::get_if<StaticRun>(&settings.kind)) {
     times = statics->load_factors;
-    for (const auto& [time, factor] : ramp.points) {
-      if (time < statics->load_factors.back()) {
-        times.push_back(time);
-      }
-    }
   } else if (const auto* frequencies = std::get_if<FrequencyRun>(&settings.kind)) {
     times = frequencies->preload.load_factors;
   }
@@ -446,8 +441,11 @@ void doubt_loads(const Model& model, const RunSettings& settings,
     if (is_zero(load)) {
       found.push_back({Weight::minor, "no load", where + ": this load is zero"});
     } else if (stays_zero(load.ramp, settings)) {
-      found.push_back(
-          {Weight::minor, "no load", where + ": the ramp of this load is zero during the whole run, so it never acts"});
+      found.push_back({Weight::minor, "no load",
+                       where + ": the ramp of this load is zero " +
+                           (std::holds_alternative<StaticRun>(settings.kind)
+                                ? "at every load step, so that no state shows it: take more (--load-steps, load_steps)"
+                                : "during the whole run, so it never acts")});
     } else if (const auto on = shared(load); on && only_held_nodes_bear(*on, held[load.body])) {
       found.push_back({Weight::minor, "no load",
                        fmt::format("{}: this {} acts on held nodes only, so it moves nothing", where, on->name)});

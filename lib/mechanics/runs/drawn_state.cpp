@@ -55,7 +55,11 @@ DrawnState drawn_state(const Model& model, const State& state, const ElementFiel
   TUNICA_ASSERT(model.body_count() > 0);
   const ResultGrid grid(model, 0);
   const std::vector<Floats> of_points = grid.values(state, fields);
-  DrawnState drawn{grid.surface(), {}, grid.shell_edges(), {}};
+  DrawnState drawn{grid.surface(), {}, grid.shell_edges(), {}, {}};
+  for (std::size_t t = 0; t < grid.tetrahedra(); ++t) {
+    const auto corner = grid.connectivity().begin() + narrow<std::ptrdiff_t>(3 * grid.triangles() + 4 * t);
+    std::ranges::copy(corner, corner + 4, drawn.tetrahedra.emplace_back().begin());
+  }
   for (std::size_t p = 0; p < grid.points(); ++p) {
     drawn.displacement.emplace_back(of_points[0][3 * p], of_points[0][3 * p + 1], of_points[0][3 * p + 2]);
   }

@@ -18,9 +18,10 @@ enum class Colouring {
 /// A state of all bodies that deform, as it is drawn.
 struct DrawnState {
   TriangleMesh reference;  ///< mm: the curved shells, welded where patches do not quite meet; solids' outer faces
-  std::vector<Vec3> displacement;                 ///< #V, mm
-  std::vector<std::array<std::size_t, 2>> edges;  ///< of the shells, in pieces: vertices of the reference
-  std::vector<double> values;                     ///< #V, MPa, mm or 1
+  std::vector<Vec3> displacement;                      ///< #V, mm
+  std::vector<std::array<std::size_t, 2>> edges;       ///< of the shells, in pieces: vertices of the reference
+  std::vector<double> values;                          ///< #V, MPa, mm or 1
+  std::vector<std::array<std::size_t, 4>> tetrahedra;  ///< of solids: vertices of the reference
 };
 
 /// What a picture shows of a state. Limits: a model without bodies that deform has no picture.

@@ -201,65 +201,6 @@ private:
   double length_before_ = 0;          ///< s
 };
 
-/// mm/s, the largest of each body's nodes.
-std::vector<double> speeds_of_bodies(const Model& model, const Rates& rates) {
-  std::vector<double> speeds(model.body_count(), 0);
-  for (std::size_t b = 0; b < speeds.size(); ++b) {
-    const std::size_t first = model.first_node(b);
-    for (std::size_t i = first; i < first + model.vertices_of(b).size(); ++i) {
-      speeds[b] = std::max(speeds[b], rates.velocity.segment<3>(first_freedom(i)).norm());
-    }
-  }
-  return speeds;
-}
-
-/// Energy that contact takes and gives. What its barrier takes and gives back is stored. Of the rest, the work of rigid
-/// bodies that move is brought in, and what friction takes is damped; where neither is, time integration loses it, or
-/// gains from it.
-class ContactWork {
-public:
-  explicit ContactWork(const ShellSystem& system)
-      : contact_(system.contact.get()),
-        rubs_(
-            std::ranges::any_of(system.model->contacts, [](const Contact& contact) { return contact.friction > 0; })) {}
-
-  /// Forces at the end of a step, which are those at the start of the next; of size zero: nothing may touch.
-  void keep(const VectorX& forces, const FreeMask& free) {
-    touched_ = std::exchange(touching_, forces);
-    if (touching_.size() > 0) {
-      mask(free, touching_);
-    }
-  }
-
-  struct Work {
-    double brought = 0, damped = 0;  ///< mJ
-  };
-
-  /// Over a step that is accepted, by the mean of its ends. @param change  displacements and rotations
-  Work over(const VectorX& change) {
-    if (contact_ == nullptr) {
-      return {};
-    }
-    const double before = std::exchange(stored_, contact_->potential());
-    const double rest = 0.5 * (touched_ + touching_).dot(change) + stored_ - before - contact_->take_hardening();
-    return contact_->is_driven() ? Work{rest, 0} : Work{0, rubs_ ? -std::min(rest, 0.0) : 0};
-  }
-
-  [[nodiscard]] double stored() const { return stored_; }
-  [[nodiscard]] const VectorX& touching() const { return touching_; }
-
-  void recall(const VectorX& touching) {
-    touching_ = touching;
-    stored_ = contact_ == nullptr ? 0 : contact_->accepted_potential();
-  }
-
-private:
-  ContactSystem* contact_;
-  bool rubs_;  ///< some contact has friction
-  VectorX touched_, touching_;
-  double stored_ = 0;  ///< mJ
-};
-
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Damping is alpha M and, in each element's own frame, beta K times the rate of its deformation: a rigid motion
 /// is not damped by beta.
@@ -548,9 +489,7 @@ private:
     };
     begin_contact(system_, settings_, s.time + from * s.length, s.time + to * s.length, configuration, solver_,
                   matrix_);
-    if (system_.contact) {
-      system_.contact->brace(speeds_of_bodies(model_, s.rates_before), s.length);
-    }
+    brace_contact(system_, s.rates_before.velocity, s.length);
     NewtonResult result =
         newton(system_, settings_, *solver_, function, (to - from) * s.held, matrix_, configuration, at_rest_);
     at_rest_ = result.iterations == 0;

@@ -1,6 +1,7 @@
 #include "tunica/mechanics/runs/fields.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
@@ -16,6 +17,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tunica {
 namespace {
@@ -117,17 +119,29 @@ struct CornerFields {
   std::vector<Facet> stress, membrane, tension, strain;
 };
 
-/// Of the shells that count.
-WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::vector<std::uint8_t>& is_out) {
-  const auto counted = [&](const std::vector<Facet>& facets) {
-    std::vector<Facet> left;
-    for (std::size_t t = 0; t < facets.size(); ++t) {
-      if (is_out[t] == 0) {
-        left.push_back(facets[t]);
-      }
+std::vector<ShellPart> wholes(std::size_t shells) {
+  std::vector<ShellPart> parts;
+  for (std::size_t t = 0; t < shells; ++t) {
+    parts.push_back({t, {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}});
+  }
+  return parts;
+}
+
+/// The same of parts of the shells.
+std::vector<Facet> of_parts(const std::vector<Facet>& shells, const std::vector<ShellPart>& parts) {
+  std::vector<Facet> facets;
+  for (const ShellPart& part : parts) {
+    const Facet& shell = shells[part.shell];
+    Facet& facet = facets.emplace_back(Facet{part.share() * shell.area, {}});
+    for (std::size_t k = 0; k < 3; ++k) {
+      facet.values[k] = part.corners[k].dot(Vec3(shell.values[0], shell.values[1], shell.values[2]));
     }
-    return left;
-  };
+  }
+  return facets;
+}
+
+/// Of parts of the shells.
+WallNumbers numbers_of(const ShellSystem& system, const CornerFields& all, const std::vector<ShellPart>& parts) {
   const auto largest = [](const std::vector<Facet>& facets) {
     double most = -infinity;
     for (const Facet& facet : facets) {
@@ -140,40 +154,40 @@ WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::v
     std::ranges::transform(about_as_rare, beside.begin(), [&](double part) { return area_quantile(facets, part); });
   };
   WallNumbers w;
-  const std::vector<Facet> stress = counted(all.stress), membrane = counted(all.membrane);
-  const std::vector<Facet> strain = counted(all.strain);
+  const std::vector<Facet> stress = of_parts(all.stress, parts), membrane = of_parts(all.membrane, parts);
+  const std::vector<Facet> strain = of_parts(all.strain, parts);
   set_quantiles(stress, w.stress_p99, w.beside.stress);
   w.stress_max = largest(stress);
   set_quantiles(membrane, w.membrane_p99, w.beside.membrane);
   w.membrane_max = largest(membrane);
   w.membrane_mean = area_mean(membrane);
-  set_quantiles(counted(all.tension), w.tension_p99, w.beside.tension);
+  set_quantiles(of_parts(all.tension, parts), w.tension_p99, w.beside.tension);
   set_quantiles(strain, w.strain_p99, w.beside.strain);
   w.strain_max = largest(strain);
   double of_faces = 0, of_middle = 0;
-  for (std::size_t t = 0; t < stress.size(); ++t) {
+  std::optional<std::pair<std::size_t, std::size_t>> largest_at;
+  // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
+  constexpr double equal_stress = 1e-6;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
     for (std::size_t k = 0; k < 3; ++k) {
-      if (stress[t].values[k] >= w.stress_p99) {
-        of_faces += stress[t].area * stress[t].values[k];
-        of_middle += stress[t].area * membrane[t].values[k];
+      if (stress[p].values[k] >= w.stress_p99) {
+        of_faces += stress[p].area * stress[p].values[k];
+        of_middle += stress[p].area * membrane[p].values[k];
+      }
+      if (!largest_at && stress[p].values[k] >= (1 - equal_stress) * w.stress_max) {
+        largest_at = {p, k};
       }
     }
   }
   w.bending_share = of_faces > 0 ? 1 - of_middle / of_faces : 0;
-  // The first of equal ones, so that on a symmetric body it is not round-off that chooses.
-  constexpr double equal_stress = 1e-6;
-  std::size_t first = 0;
-  for (const ShellBody& body : model.shells) {
-    for (std::size_t v = 0, t = first; const auto& triangle : body.mesh.triangles) {
-      for (v = 0; v < 3; ++v) {
-        if (is_out[t] == 0 && all.stress[t].values[v] >= (1 - equal_stress) * w.stress_max) {
-          w.stress_max_at = body.mesh.vertices[triangle[v]];
-          return w;
-        }
-      }
-      ++t;
+  if (largest_at) {
+    const auto& [shell, corners] = parts[largest_at->first];
+    const ShellElement& element = system.elements[shell];
+    const std::size_t first = system.model->first_node(element.body);
+    for (std::size_t i = 0; i < 3; ++i) {
+      w.stress_max_at += corners[largest_at->second][narrow<Eigen::Index>(i)] *
+                         system.model->shells[element.body].mesh.vertices[element.nodes[i] - first];
     }
-    first += body.mesh.triangles.size();
   }
   return w;
 }
@@ -182,9 +196,9 @@ WallNumbers numbers_of(const Model& model, const CornerFields& all, const std::v
 
 struct ElementFieldEvaluator::Implementation {
   explicit Implementation(const System& of)
-      : whole(of), model(whole->model()), system(whole->parts()), recovery(system), near(near_disturbances(model)) {}
+      : whole(of), model(whole->model()), system(whole->parts()), recovery(system), far(far_from_disturbances(model)) {}
   explicit Implementation(const Model& of)
-      : alone(make_system(checked(of))), model(of), system(*alone), recovery(*alone), near(near_disturbances(of)) {
+      : alone(make_system(checked(of))), model(of), system(*alone), recovery(*alone), far(far_from_disturbances(of)) {
     add_prestress(*alone, RunSettings());
   }
 
@@ -193,7 +207,7 @@ struct ElementFieldEvaluator::Implementation {
   const Model& model;
   const ShellSystem& system;
   Recovery recovery;
-  std::vector<std::uint8_t> near;  ///< near_disturbances()
+  std::vector<ShellPart> far;  ///< far_from_disturbances()
 
   void add_shells(const State& state, ElementFields& fields) const;
   void add_solids(const State& state, ElementFields& fields) const;
@@ -252,12 +266,11 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
   const auto stressed_corners = system.prestress_residual ? recovery.at_corners(stressed) : strained_corners;
   CornerFields corners;
   std::vector<double> weight(model.node_count(), 0);
-  double whole = 0, near_area = 0;
+  double whole = 0, far_area = 0;
   for (std::size_t t = 0; t < system.elements.size(); ++t) {
     const ShellElement& element = system.elements[t];
     const double area = recovery.area(t);
     whole += area;
-    near_area += near[t] != 0 ? area : 0;
     for (auto* list : {&corners.stress, &corners.membrane, &corners.tension, &corners.strain}) {
       list->push_back({area, {}});
     }
@@ -281,13 +294,15 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
     fields.membrane_stress[i] /= weight[i] > 0 ? weight[i] : 1;
     fields.strain[i] /= weight[i] > 0 ? weight[i] : 1;
   }
-  constexpr double all = 1 - 1e-9;
-  const std::vector<std::uint8_t> none(near.size(), 0);
+  constexpr double hardly_any = 1e-9;
+  for (const ShellPart& part : far) {
+    far_area += part.share() * recovery.area(part.shell);
+  }
   Wall& wall = fields.wall;
-  wall.whole = numbers_of(model, corners, none);
-  wall.is_all_near = near_area > all * whole;
-  wall.left_out = wall.is_all_near ? 0 : near_area / whole;
-  static_cast<WallNumbers&>(wall) = wall.left_out > 0 ? numbers_of(model, corners, near) : wall.whole;
+  wall.whole = numbers_of(system, corners, wholes(system.elements.size()));
+  wall.is_all_near = !(far_area > hardly_any * whole);
+  wall.left_out = wall.is_all_near || far_area > (1 - hardly_any) * whole ? 0 : 1 - far_area / whole;
+  static_cast<WallNumbers&>(wall) = wall.left_out > 0 ? numbers_of(system, corners, far) : wall.whole;
   wall.is_max_on_held = is_held(wall.whole.stress_max_at);
 }
 

@@ -15,7 +15,7 @@ namespace tunica {
 struct WallNumbers {
   double stress_p99 = 0;  ///< MPa
   double stress_max = 0;
-  Vec3 stress_max_at = Vec3::Zero();  ///< mm, the node, in the reference
+  Vec3 stress_max_at = Vec3::Zero();  ///< mm, in the reference, on the flat facets
   double membrane_p99 = 0;            ///< MPa
   double membrane_max = 0;
   double membrane_mean = 0;  ///< over the area: of a closed organ its volume and area all but decide it

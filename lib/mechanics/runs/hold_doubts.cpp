@@ -301,7 +301,11 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     const bool pushed =
-        std::ranges::any_of(model.fixes, [&](const Fix& fix) { return fix.body == b && prescribes(fix); });
+        std::ranges::any_of(model.fixes, [&](const Fix& fix) { return fix.body == b && prescribes(fix); }) ||
+        std::ranges::any_of(model.contacts, [&](const Contact& contact) {
+          return std::ranges::any_of(contact.between,
+                                     [&](const ContactParty& party) { return !party.rigid && party.index == b; });
+        });
     if (pushed || pressure_on(model, b) == 0) {
       continue;
     }

@@ -119,6 +119,20 @@ LinearSolution LinearSolver::solve(const std::vector<double>& factors, const Vec
   return solution;
 }
 
+BlockMatrix stressed_tangent(ShellSystem& system, const VectorX& solution, const std::vector<double>& factors) {
+  Forces forces;
+  BlockMatrix tangent = system.pattern;
+  auto elements = system.elements;
+  auto solids = system.solids;
+  add_stress(system, solution);
+  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
+  VectorX unbalanced = forces.external - forces.internal;  // what ties bear turns with them
+  condense(system, reference_configuration(system), unbalanced, &tangent);
+  system.elements = std::move(elements);
+  system.solids = std::move(solids);
+  return tangent;
+}
+
 namespace {
 
 Configuration configuration_of(const ShellSystem& system, const VectorX& moved) {
@@ -175,7 +189,7 @@ public:
   [[nodiscard]] bool is_driven() const { return 2 * moved_.dot(brought_) < energy_; }  ///< by what is prescribed
   [[nodiscard]] bool valid() const { return valid_; }
 
-  /// 6 per node, what grows as the square of the part.
+  /// 6 per node that is not carried, what grows as the square of the part.
   VectorX even(double part) {
     const VectorX moved = part * moved_;
     return 0.5 * (at(moved, part) + at(-moved, -part));
@@ -190,12 +204,19 @@ public:
 private:
   VectorX at(const VectorX& moved, double part) {
     std::ranges::transform(factors_, scaled_.begin(), [&](double factor) { return part * factor; });
+    // What is carried turns with what carries it, and acts there.
+    Configuration there = reference_configuration(system_);
+    advance_configuration(system_, moved, there);
     Forces forces;
-    evaluate(system_, {configuration_of(system_, moved), scaled_}, forces, nullptr);
+    evaluate(system_, {there, scaled_}, forces, nullptr);
     valid_ = valid_ && forces.valid;
-    VectorX internal;
-    linear_forces(system_, moved, internal);
-    return forces.external - resting_ - part * brought_ - forces.internal + internal;
+    VectorX left = forces.external - forces.internal;
+    condense(system_, there, left, nullptr);
+    VectorX linear;
+    linear_forces(system_, moved, linear);
+    linear = resting_ + part * brought_ - linear;
+    condense(system_, reference_configuration(system_), linear, nullptr);
+    return left - linear;
   }
 
   const ShellSystem& system_;
@@ -217,23 +238,29 @@ double largest_move(const VectorX& moved) {
 
 }  // namespace
 
-double LinearSolver::departure(const LinearSolution& solution, const std::vector<double>& factors) {
-  BeyondLinear beyond(system_, solution, factors);
+double linear_departure(ShellSystem& system, const RunSettings& settings, const LinearSolution& solution,
+                        const std::vector<double>& factors) {
+  BeyondLinear beyond(system, solution, factors);
   if (!(beyond.energy() > 0)) {
     return 0;  // nothing moves
   }
+  BlockMatrix tangent = stressed_tangent(system, solution.moved, factors);
+  symmetrise(tangent);
+  TangentSolver solver(system, settings);
+  VectorX none;
+  // Beyond the buckling load: a strip pushed along itself shows nothing else of it.
+  const bool stable = solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite;
   const auto response_to = [&](VectorX left) {
-    condense(system_, reference_configuration(system_), left, nullptr);
-    mask(solver_.free(), left);
+    mask(solver.free(), left);
     VectorX response = VectorX::Zero(left.size());
-    solver_.solve(matrix_, left, response, std::exchange(factored_, true));
-    expand(system_, response);
+    solver.solve(tangent, left, response, true);
+    expand(system, response);
     return response;
   };
   const double motion = largest_move(solution.moved);
   constexpr double least = 1e-3, largest = 0.064;  // parts of the load
   double first = 0, aside = 0;
-  if (system_.prestress_residual) {  // what the reference bears already counts in proportion to the load
+  if (system.prestress_residual) {  // what the reference bears already counts in proportion to the load
     const VectorX forces = beyond.odd(least, VectorX::Zero(solution.moved.size()));
     first = solution.moved.dot(forces) / beyond.energy();
     aside = largest_move(response_to(forces)) / motion;
@@ -261,23 +288,14 @@ double LinearSolver::departure(const LinearSolution& solution, const std::vector
   if (!beyond.valid()) {
     return 1;
   }
+  if (!stable) {
+    aside = std::max(aside, 1.0);
+  }
   if (beyond.is_driven()) {  // the forces differ
     return std::max(aside, std::abs(first + second + third - 2 * second * second));
   }
   const auto amount = amount_at_load(1 - first, second, third);
   return std::max(aside, amount ? std::abs(1 - *amount) / *amount : 1);
-}
-
-BlockMatrix stressed_tangent(ShellSystem& system, const VectorX& solution, const std::vector<double>& factors) {
-  Forces forces;
-  BlockMatrix tangent = system.pattern;
-  auto elements = system.elements;
-  auto solids = system.solids;
-  add_stress(system, solution);
-  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
-  system.elements = std::move(elements);
-  system.solids = std::move(solids);
-  return tangent;
 }
 
 double LinearSolver::residual(const LinearSolution& solution) const {
@@ -327,21 +345,10 @@ private:
     const LinearSolution solution = solution_at(factor);
     if (is_last()) {
       const double most = *std::ranges::max_element(run_.load_factors, {}, [](double f) { return std::abs(f); });
-      summary_.linear_departure =
-          departure(most == factor ? solution : solution_at(most), load_factors(model_, true, most));
+      summary_.linear_departure = linear_departure(system_, settings_, most == factor ? solution : solution_at(most),
+                                                   load_factors(model_, true, most));
     }
     return state_of(solution, factor);
-  }
-
-  /// 1 at least beyond the buckling load: a strip pushed along itself shows nothing else of it.
-  double departure(const LinearSolution& solution, const std::vector<double>& factors) {
-    BlockMatrix tangent = stressed_tangent(system_, solution.moved, factors);
-    symmetrise(tangent);
-    TangentSolver solver(system_, settings_);
-    VectorX none;
-    const bool stable = solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite;
-    const double found = solver_.departure(solution, factors);
-    return stable ? found : std::max(found, 1.0);
   }
 
   LinearSolution solution_at(double factor) {

@@ -42,23 +42,6 @@ void hold_loose_pieces(ShellSystem& system, const std::vector<double>& factors) 
   }
 }
 
-/// Whether Young's modulus of every body is known: else how stiff the wall is says nothing.
-bool has_stiffness(const Model& model) {
-  return std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.material.young_stated; });
-}
-
-/// Whether the reference is a stable state of rest under the pressures of the image: its tangent is positive definite.
-bool rests(ShellSystem& system, RunSettings settings, const std::vector<double>& factors) {
-  settings.solver = Solver::direct;
-  BlockMatrix tangent = system.pattern;
-  Forces forces;
-  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
-  VectorX none = VectorX::Zero(first_freedom(system.node_count()));
-  condense(system, reference_configuration(system), none, &tangent);
-  symmetrise(tangent);
-  return TangentSolver(system, settings).solve(tangent, VectorX::Zero(none.size()), none).positive_definite;
-}
-
 }  // namespace
 
 void add_stress(ShellSystem& system, const VectorX& moved) {
@@ -103,13 +86,33 @@ void add_prestress(ShellSystem& system, const RunSettings& settings) {
   const double residual = solver.residual(solution);
   add_stress(system, solution.moved);
   system.prestress_residual = residual;
+  system.held = held;
   system.terms = terms;
   system.bed = bed;
-  if (contact == nullptr && has_stiffness(model)) {
-    system.rests_as_imaged = rests(system, exact, factors);
-  }
-  system.held = held;
   system.contact = contact;
+}
+
+std::optional<bool> rests_as_imaged(ShellSystem& system, RunSettings settings) {
+  const Model& model = *system.model;
+  const auto is_known = [](const ShellBody& body) { return body.material.young_stated; };
+  if (!system.prestress_residual || system.contact || !std::ranges::all_of(model.shells, is_known)) {
+    return {};
+  }
+  const std::vector<double> factors(model.loads.size(), 0.0);
+  const auto held = system.held;
+  hold_loose_pieces(system, factors);
+  settings.solver = Solver::direct;
+  BlockMatrix tangent = system.pattern;
+  Forces forces;
+  evaluate(system, {reference_configuration(system), factors}, forces, &tangent);
+  VectorX unbalanced = forces.external - forces.internal;
+  condense(system, reference_configuration(system), unbalanced, &tangent);
+  symmetrise(tangent);
+  VectorX none;
+  const bool rests =
+      TangentSolver(system, settings).solve(tangent, VectorX::Zero(unbalanced.size()), none).positive_definite;
+  system.held = held;
+  return rests;
 }
 
 }  // namespace tunica

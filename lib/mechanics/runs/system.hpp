@@ -25,7 +25,7 @@ public:
   /// Relative, of the balance of the stress that the reference bears; none where it bears none. Errors: as solve().
   [[nodiscard]] std::optional<double> prestress_residual() const;
   /// Whether the reference, with this stress, is a stable state of rest; none where it bears none, where Young's
-  /// modulus of some shell is not known, and with contact. Errors: as solve().
+  /// modulus of some shell is not known, and with contact. Errors: as solve(). Cost: one factorisation.
   [[nodiscard]] std::optional<bool> rests_as_imaged() const;
 
   /// For the runs themselves: the reference bears its stress.

@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/mechanics/runs/detail/places.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
 #include "tunica/surface/mesh/measure.hpp"
@@ -59,6 +60,22 @@ Model under_imaging_pressure(Model model) {
   return model;
 }
 
+/// The middle of the shell that lies least in the plane that its normals give it.
+Vec3 sharpest_place(const Model& model) {
+  double least = infinity;
+  Vec3 place = Vec3::Zero();
+  for (const ShellBody& body : model.shells) {
+    for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
+      if (const double agreement = normal_agreement(body.mesh, t); !(agreement >= least)) {
+        least = agreement;
+        const auto& [i, j, k] = body.mesh.triangles[t];
+        place = (body.mesh.vertices[i] + body.mesh.vertices[j] + body.mesh.vertices[k]) / 3;
+      }
+    }
+  }
+  return place;
+}
+
 /// The equilibrium on the image, solved for the motion that led there from the reference: displacements and rotation
 /// vectors (times a length) of all nodes, one after the other.
 class InverseStatics {
@@ -86,10 +103,8 @@ public:
     std::optional<ShellSystem> system;
     try {
       system = make_checked_system(model, settings_);
-    } catch (const InputError& error) {
-      // Shells that were good in the image: what is said of them names the fold, and what it advises is for images.
-      const std::string fault = error.what();
-      reason = "on the way to it the wall folds (" + fault.substr(0, fault.find("; ")) + ")";
+    } catch (const InputError&) {  // of shells that were good in the image; what it advises is for images
+      reason = "on the way to it the wall folds near " + where(sharpest_place(model));
       return {};
     }
     Configuration there = configuration(motion);

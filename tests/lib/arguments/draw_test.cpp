@@ -17,6 +17,10 @@ TEST(DrawArguments, MeshesAreChecked) {
   const std::vector<Call<TriangleMesh>> calls{
       {"surface_picture", [](const TriangleMesh& m) { surface_picture(m, {}, {}); }},
       {"thumbnail", [](const TriangleMesh& m) { thumbnail(m, {}, {}); }},
+      {"moments_picture",
+       [](const TriangleMesh& m) {
+         moments_picture({{m, {}, {}, {}, ""}}, {}, {});
+       }},
       {"shaded_surface", [](const TriangleMesh& m) { shaded_surface(m, std::vector<double>(m.vertices.size(), 1.0)); }},
       {"moved_picture",
        [](const TriangleMesh& m) {
@@ -73,6 +77,11 @@ TEST(DrawArguments, ValuesAndNumbersAreChecked) {
     options.lines.push_back({Vec3::Zero(), Vec3(0, infinity, 0)});
     surface_picture(ball, {}, options);
   });
+  expect_refused("no moments", [] { moments_picture({}, {}, {}); });
+  expect_refused("values of a moment", [&] { moments_picture({{ball, few, {}, {}, ""}}, {}, {}); });
+  for (const PictureCut& cut : {PictureCut{Vec3(1, 1, 0), 0}, {Vec3(nan, 0, 0), 0}, {Vec3(1, 0, 0), infinity}}) {
+    expect_refused("cut", [&] { moments_picture({{ball, {}, {}, {}, ""}}, {}, cut); });
+  }
   expect_refused("no points", [] { (void)picture_axes({}); });
   expect_refused("points", [] { (void)picture_axes({Vec3(0, 0, nan)}); });
   expect_numbers_checked({

@@ -189,7 +189,7 @@ TEST(MechanicsArguments, WhatAModelNamesIsThere) {
     expect_refused("solve, " + damage.name, [&] { run(bad); });
     expect_refused("doubts, " + damage.name, [&] { doubts(bad, linear()); });
     expect_refused("element_fields, " + damage.name, [&] { ElementFieldEvaluator{bad}; });
-    expect_refused("near_disturbances, " + damage.name, [&] { near_disturbances(bad); });
+    expect_refused("far_from_disturbances, " + damage.name, [&] { far_from_disturbances(bad); });
     expect_refused("find_unloaded, " + damage.name, [&] { find_unloaded(bad, linear()); });
   }
 }

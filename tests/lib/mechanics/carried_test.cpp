@@ -8,6 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 namespace tunica {
 namespace {
 
@@ -128,6 +130,31 @@ TEST(Carried, RigidMotionsGiveNoForce) {
     VectorX unbalanced = forces.external - forces.internal;
     condense(system, moved, unbalanced, nullptr);
     EXPECT_LT(force_norm(system, unbalanced), 1e-11);
+  }
+}
+
+/// A body that all but floats is pulled at both ends: tension turns it, not its bed, and what ties bear turns with
+/// them. Linear runs are off by about as much as is said of them.
+TEST(Carried, ABodyThatFloatsIsAsFarBeyondALinearRunAsIsSaid) {
+  for (const double stiffness : {1e-2, 1e-4, 1e-6}) {
+    Model model = solid_on_shell();
+    std::vector<Index> all(model.shells[0].mesh.vertices.size());
+    std::iota(all.begin(), all.end(), 0);
+    model.supports.push_back({0, all, stiffness, false, {}});
+    for (const double side : {-1.0, 1.0}) {
+      const auto nodes = nodes_of(model, 0, [&](const Vec3& x) { return side * x.y() > 2 - eps; });
+      model.loads.push_back({0, ForceLoad{nodes, Vec3(0, 0.05 * side, 0)}, {}});
+    }
+    State linear;
+    const double said = *solve(model, linear_run(), [&](const State& state) { linear = state; }).linear_departure;
+    const State right = last_state(model, nonlinear_run({0.25, 0.5, 0.75, 1}));
+    double off = 0, most = 0;
+    for (std::size_t i = 0; i < right.displacement.size(); ++i) {
+      off = std::max(off, (right.displacement[i] - linear.displacement[i]).norm());
+      most = std::max(most, linear.displacement[i].norm());
+    }
+    EXPECT_LT(said, 2 * off / most) << stiffness;
+    EXPECT_GT(said, off / most / 2) << stiffness;
   }
 }
 

@@ -36,6 +36,12 @@ class Imaged(SimulateTest):
         with h5py.File(self.path(name)) as file:
             return np.array(file["tunica/elements"][key][-1])
 
+    def test_a_shape_in_which_the_wall_cannot_rest_is_said(self):
+        for young, stable in (("1GPa", True), ("1kPa", False)):
+            report = self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at=-120mmHg", "--static", "--young", young, "--force")
+            self.assertIs(report["result"]["prestress"]["stable"], stable)
+            self.assertEqual(any("cannot rest in the shape of the image" in text for text in report["warnings"]), not stable)
+
     def test_at_that_pressure_no_stiffness_is_needed_and_nothing_moves(self):
         report = self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static")
         result = report["result"]
@@ -46,6 +52,7 @@ class Imaged(SimulateTest):
             self.assertAlmostEqual(report["stated"][key] / (120 * MMHG), 1, places=8)
         self.assertAlmostEqual(result["prestress"]["pressure_mpa"] / (120 * MMHG), 1, places=8)
         self.assertLess(result["prestress"]["residual"], 1e-9)
+        self.assertIsNone(result["prestress"]["stable"], "how stiff the wall is is not known")
         found = self.faces()
         for young in ("0.1MPa", "1GPa"):  # and the same with any
             self.run_tool("oval.ply", "any.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--young", young, "--force")

@@ -102,6 +102,42 @@ class Picture(SimulateTest):
         self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--colour", "stress", "--force",
                       code=2, says="no stress")
 
+    def test_moments_are_panels_of_the_nearest_states(self):
+        run = [*BALL, "--load-steps", "4", "--picture", "out.png", "--force"]
+        pictures = {}
+        for at in ("0.5", "0.45", "1", "0.5 1"):
+            self.run_tool(*run, "--picture-at", at)
+            pictures[at] = self.pixels()
+        self.assertTrue(np.array_equal(pictures["0.5"], pictures["0.45"]))
+        self.assertFalse(np.array_equal(pictures["0.5"], pictures["1"]))
+        left, right = pictures["0.5 1"][VIEW][:, :600], pictures["0.5 1"][VIEW][:, 700:]
+        for half in (left, right):
+            self.assertGreater(np.mean(half.min(axis=2) < 250), 0.2)
+        self.assertLess(np.median(right[right.min(axis=2) < 230][:, 1]), np.median(left[left.min(axis=2) < 230][:, 1]) - 20,
+                        "twice the stress is not darker")
+
+    def test_moments_of_motions_and_modes(self):
+        wall = ("[[shell]]\nname = \"s\"\nmesh = \"ball.ply\"\nthickness = \"0.5mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n"
+                "density = \"1100kg/m3\"\n[[fix]]\nbody = \"s\"\nwhere = {rigid_motions = true}\n")
+        load = "[[load]]\nbody = \"s\"\nkind = \"pressure\"\nvalue = \"1kPa\"\n"
+        for run, more, at in (("kind = \"dynamic\"\nduration = \"2ms\"\nstep = \"0.5ms\"\n", load, "0ms, 1ms, 2ms"),
+                              ("kind = \"frequencies\"\ncount = 2\n", "", "1 2")):
+            with self.subTest(run=run):
+                self.write("scene.toml", "[run]\n" + run + wall + more)
+                self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--picture-at", at, "--force")
+                self.assertGreater(np.mean(self.pixels()[VIEW].min(axis=2) < 250), 0.1)
+
+    def test_a_solid_cut_open_shows_its_inside(self):
+        points, tetrahedra = block(3, np.array([10.0, 10.0, 10.0]), np.zeros(3))
+        write_vtk(self.path("block.vtk"), points, tetrahedra)
+        self.write("scene.toml", "[run]\nkind = \"static\"\n" + solid("b", "block.vtk", 1.0, 0.3) +
+                   held("b", np.where(points[:, 2] == 0)[0], "xyz") + held("b", np.where(points[:, 2] == 10)[0], "xyz", (0, 0, -1)))
+        covered = {}
+        for words in ((), ("--picture-cut=-y",)):
+            self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--picture-at", "1", *words, "--force")
+            covered[words] = np.mean(self.pixels()[VIEW].min(axis=2) < 250)
+        self.assertGreater(covered[("--picture-cut=-y",)], 0.5 * covered[()], "the section has no face")
+
     def test_what_is_refused(self):
         def refused(message, *arguments, code=2):
             self.run_tool(*BALL, *arguments, code=code, says=message)
@@ -118,6 +154,13 @@ class Picture(SimulateTest):
         refused(".png", "--picture", "out.jpg")
         self.write("there.png", "")
         refused("exists", "--picture", "there.png", code=5)
+
+    def test_moments_and_cuts_that_are_none_are_refused(self):
+        for flag, value, said in (("at", "soon", "'soon' is not a number"), ("at", ",", "one to 24 moments"), ("at", "1 " * 25, "not 25"),
+                                  ("cut", "w", "is no axis with a place"), ("cut", "y=3", "unit"), ("cut", "yy", "is no axis")):
+            with self.subTest(flag=flag, value=value):
+                self.run_tool(*BALL, "--picture", "out.png", f"--picture-{flag}={value}", code=2, says=[f"--picture-{flag}: ", said])
+        self.run_tool(*BALL, "--picture-at", "1", code=2, says="--picture-at belongs to --picture")
 
     def test_a_run_that_fails_leaves_no_picture(self):
         self.run_tool("ball.ply", "out.hdf", "--young", "1kPa", "--poisson", "0.3", "--thickness", "0.05mm",

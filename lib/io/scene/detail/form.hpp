@@ -4,7 +4,9 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/io/scene/detail/scene_table.hpp"
 
+#include <concepts>
 #include <functional>
+#include <memory>
 
 namespace tunica {
 
@@ -33,12 +35,32 @@ struct Range {
 inline constexpr Range positive{0, infinity, "{key} must be greater than zero"};
 inline constexpr Range not_negative{0, infinity, "{key} must not be negative", true};
 
+/// A function that its copies share. Functions of a row hold those of its parts, which hold those of theirs: copied as
+/// wholes, they would take a second under the sanitizers.
+template <typename Signature>
+class Shared {
+public:
+  Shared() = default;
+  template <typename Function>
+  requires std::convertible_to<Function, std::function<Signature>> Shared(Function function)
+      : function_(std::make_shared<const std::function<Signature>>(std::move(function))) {}
+
+  explicit operator bool() const { return function_ != nullptr && *function_; }
+  template <typename... Arguments>
+  auto operator()(Arguments&&... arguments) const {
+    return (*function_)(std::forward<Arguments>(arguments)...);
+  }
+
+private:
+  std::shared_ptr<const std::function<Signature>> function_;
+};
+
 /// How a value stands in a scene file: read as it was written, whatever it is.
 template <typename Value>
 struct Form {
   std::string like;  ///< as it may be written, for messages and the manual
-  std::function<Value(const SceneTable&, const toml::node&, std::string_view key)> read{};
-  std::function<std::string(const Value&, const Writing&)> write{};
+  Shared<Value(const SceneTable&, const toml::node&, std::string_view key)> read{};
+  Shared<std::string(const Value&, const Writing&)> write{};
   std::optional<Range> range{};  ///< of numbers
 
   /// The same for values that pass alone. @param check  (value, place, key)

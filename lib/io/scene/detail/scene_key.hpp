@@ -17,16 +17,16 @@ struct SceneKey {
   std::string says;  ///< to the user, in the manual and in the help of a flag
   std::string like;  ///< a value as it may be written
   std::optional<Range> range{};
-  std::function<void(const SceneTable&, const toml::node&, Item&)> read{};
-  std::function<std::string(const Item&, const Writing&)> write{};  ///< empty: the key is not written
+  Shared<void(const SceneTable&, const toml::node&, Item&)> read{};
+  Shared<std::string(const Item&, const Writing&)> write{};  ///< empty: the key is not written
   /// Of a number with a range: whether it lies there.
-  std::function<void(const Item&, const Place&)> check{};
+  Shared<void(const Item&, const Place&)> check{};
   /// As it is written where nothing is said; empty: nothing.
-  std::function<std::string()> fallback{};
+  Shared<std::string()> fallback{};
   /// Why the key does not belong to an item, as it is so far; empty: it belongs.
-  std::function<std::string(const Item&)> refuses{};
+  Shared<std::string(const Item&)> refuses{};
   /// Whether a scene that is written out has it; none: always.
-  std::function<bool(const Item&)> is_written{};
+  Shared<bool(const Item&)> is_written{};
   bool is_needed = false;
   std::string_view why{};      ///< it is needed, for the message that it is missing
   std::string_view instead{};  ///< a key that makes this one needless

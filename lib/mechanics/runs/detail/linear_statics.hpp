@@ -25,13 +25,6 @@ public:
 
   /// What is left out of balance, of the forces.
   [[nodiscard]] double residual(const LinearSolution& solution) const;
-  /// By how much the theory of large rotations moves less, more or aside, relative to what it gives; of prescribed
-  /// motion, by how much its forces differ. From the path's expansion about the reference, to the third order, with the
-  /// wall free to relax in the second; 1 at least where that has a limit load before.
-  /// Source: Koiter 1945, "Over de stabiliteit van het elastisch evenwicht"; Haftka, Mallett, Nachbar 1971, "Adaption
-  /// of Koiter's method to finite element analysis of snap-through buckling behavior". Cost: two to seven solves, four
-  /// evaluations of the forces each. Limits: an order of magnitude where it passes 1.
-  double departure(const LinearSolution& solution, const std::vector<double>& factors);
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
 
 private:
@@ -45,6 +38,16 @@ private:
   BlockMatrix matrix_;
   bool factored_ = false;
 };
+
+/// By how much the theory of large rotations moves less, more or aside than a linear solution, relative to what that
+/// gives; of prescribed motion, by how much its forces differ. From the path's expansion about the reference, to the
+/// third order, with the wall free to relax in the second by the tangent under the load: a bed may be far softer than
+/// what tension turns back. 1 at least where the path has a limit load or buckles before. Source: Koiter 1945, "Over de
+/// stabiliteit van het elastisch evenwicht"; Haftka, Mallett, Nachbar 1971, "Adaption of Koiter's method to finite
+/// element analysis of snap-through buckling behavior". Cost: two to eight solves, four evaluations of the forces each.
+/// Limits: an order of magnitude where it passes 1.
+double linear_departure(ShellSystem& system, const RunSettings& settings, const LinearSolution& solution,
+                        const std::vector<double>& factors);
 
 /// The tangent at the reference with the stress of a linear solution, under the loads: of linear buckling, which leaves
 /// out that the solution moves the shell. Cost: linear.

@@ -16,6 +16,11 @@ namespace tunica {
 /// Errors: InputError: nothing bears the pressure; RequirementError: as LinearSolver. Cost: one linear solve.
 void add_prestress(ShellSystem& system, const RunSettings& settings);
 
+/// Whether the reference with this stress is a stable state of rest under the pressures of the image: its tangent is
+/// positive definite. None where it bears no such stress, where Young's modulus of some shell is not known, so that how
+/// stiff the wall is says nothing, and with contact. Errors: as add_prestress(). Cost: one factorisation.
+std::optional<bool> rests_as_imaged(ShellSystem& system, RunSettings settings);
+
 /// Adds the stress of linear displacements (6 per node) to what the reference bears.
 void add_stress(ShellSystem& system, const VectorX& moved);
 

@@ -90,9 +90,6 @@ struct ShellSystem {
   FreeMask held;                       ///< 6 per node; what is not free
   std::vector<std::size_t> balancing;  ///< of those, what holds only rigid motions of bodies whose loads are in balance
   std::vector<PrescribedFreedom> prescribed;
-  /// Whether it is a stable state of rest under the pressures of the image; none: not known without Young's modulus, or
-  /// with contact.
-  std::optional<bool> rests_as_imaged;
   std::optional<double> prestress_residual;  ///< of the balance of the stress that the reference bears, relative
   double length = 0;                         ///< mean edge, mm: what makes moments comparable with forces
   /// Norms of the elements' stiffness, moments divided by `length`: forces by displacements (N/mm), by rotations (N).

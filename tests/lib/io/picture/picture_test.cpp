@@ -105,6 +105,55 @@ TEST(Picture, BarGetsDarkerFromZeroToTheLargestValueAndEndsAtARoundNumber) {
   EXPECT_GT(count_near(image, right_view, bottom, 60), 5000) << "small values are not light";
 }
 
+TEST(Picture, MomentsStandBesideEachOtherByOneBarAndAreCutWhereAsked) {
+  const TriangleMesh ball = make_sphere(20, 4);
+  PictureMoment small{ball, std::vector<double>(ball.vertices.size(), 0.1), {}, {}, "at rest"};
+  PictureMoment large = small;
+  large.values.assign(ball.vertices.size(), 2);
+  large.when = "loaded";
+  const Image whole = read_png(moments_picture({small, large}, {}, {}));
+  const Image cut = read_png(moments_picture({small, large}, {}, PictureCut{Vec3(0, -1, 0), 0}));
+  const Pixel top = pixel(whole, bar.x + 17, bar.y + 2);
+  for (const Image* image : {&whole, &cut}) {
+    EXPECT_EQ(count_near(*image, left_view, top, 30), 0);
+    EXPECT_GT(count_near(*image, right_view, top, 60), 5000);
+  }
+  EXPECT_LT(brightness(pixel(cut, 340, 450)), brightness(pixel(whole, 340, 450))) << "the inner side is darker";
+  const TriangleMesh far{{{1e3, 0, 0}, {1e3, 1, 0}, {1e3, 0, 1}}, {{0, 1, 2}}};
+  small.surface = far;
+  small.values = {0, 0, 0};
+  EXPECT_NO_THROW((void)moments_picture({small}, {}, PictureCut{Vec3(1, 0, 0), 0})) << "nothing is left";
+}
+
+TEST(Picture, ASectionOfATetrahedronLiesInTheCutAndFacesTheViewerWithLinearValues) {
+  const std::vector<Vec3> corners{{0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {0, 0, 3}};
+  const auto value = [](const Vec3& p) { return 1 + 2 * p.x() - p.y() + 3 * p.z(); };
+  const double slant = std::sqrt(0.5);
+  for (const auto& [cut, area] : {std::pair{PictureCut{Vec3(0, 0, 1), 1}, 2.0},
+                                  {PictureCut{Vec3(0, 0, -1), -1}, 2.0},
+                                  {PictureCut{Vec3(0, 0, 1), 4}, 0.0},
+                                  {PictureCut{Vec3(slant, slant, 0), 1.5 * slant}, 1.5 * 1.5 / slant}}) {
+    PictureMoment moment{{corners, {}}, {}, {}, {}, ""};
+    for (const Vec3& p : corners) {
+      moment.values.push_back(value(p));
+    }
+    add_section(cut, {{3, 1, 0, 2}}, moment);
+    Vec3 section = Vec3::Zero();
+    for (const auto& [i, j, k] : moment.surface.triangles) {
+      const auto& v = moment.surface.vertices;
+      section += (v[j] - v[i]).cross(v[k] - v[i]) / 2;
+      EXPECT_GT((v[j] - v[i]).cross(v[k] - v[i]).dot(cut.normal), 0);
+    }
+    EXPECT_NEAR((section - area * cut.normal).norm(), 0, 1e-4);
+    for (std::size_t v = corners.size(); v < moment.values.size(); ++v) {
+      const Vec3& p = moment.surface.vertices[v];
+      EXPECT_NEAR(cut.normal.dot(p), cut.offset, 1e-5);
+      EXPECT_LT(cut.normal.dot(p), cut.offset) << "it would be cut away itself";
+      EXPECT_NEAR(moment.values[v], value(p), 1e-12);
+    }
+  }
+}
+
 TEST(Picture, ARangeMakesTheColoursOfTwoPicturesTheSame) {
   const TriangleMesh sphere = make_sphere(20, 4);
   std::vector<double> small = bump(sphere, {0, -1, 0});
