@@ -117,12 +117,13 @@ function(tunica_test name)
 endfunction()
 
 # tunica_tool_test(NAME SCRIPT script.py [ARGUMENTS a...] [TIMEOUT s]): a Python program of the current folder that runs
-# the built tools. Python is Debian's own: its packages bring NumPy, h5py, NiBabel and VTK.
+# the built tools. Python is Debian's own, for make as well: its packages bring NumPy, h5py, NiBabel and VTK.
 function(tunica_tool_test name)
   cmake_parse_arguments(arg "" "SCRIPT;TIMEOUT" "ARGUMENTS" TIMEOUT 600 ${ARGN})
   add_test(NAME ${name} COMMAND /usr/bin/python3 -B ${CMAKE_CURRENT_SOURCE_DIR}/${arg_SCRIPT} ${arg_ARGUMENTS})
   set(environment TUNICA_BIN=${PROJECT_BINARY_DIR}/bin TUNICA_BUILD=${PROJECT_BINARY_DIR}
                   TUNICA_SOURCE=${PROJECT_SOURCE_DIR} TUNICA_SHARED_DATA=${TUNICA_SHARED_DATA}
                   PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support CMAKE=${CMAKE_COMMAND})
-  set_tests_properties(${name} PROPERTIES LABELS whole_tool TIMEOUT ${arg_TIMEOUT} ENVIRONMENT "${environment}")
+  set_tests_properties(${name} PROPERTIES LABELS whole_tool TIMEOUT ${arg_TIMEOUT} ENVIRONMENT "${environment}"
+                       ENVIRONMENT_MODIFICATION PATH=path_list_prepend:/usr/bin)
 endfunction()

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 namespace tunica::chain {
@@ -79,7 +80,10 @@ std::string result_picture(const Model& model, const std::vector<PicturedState>&
     moments.back().others = std::move(rigids);
     moments.back().when = when;
   }
-  look.title = quantity.title;
+  const auto is_left = [&](const Vec3& p) { return !cut || cut->normal.dot(p) <= cut->offset; };
+  const bool shows = std::ranges::any_of(
+      moments, [&](const PictureMoment& moment) { return std::ranges::any_of(moment.surface.vertices, is_left); });
+  look.title = shows ? quantity.title : "The cut leaves nothing: all bodies lie beyond it";
   look.caption += magnification_text(options.magnify);
   return moments_picture(moments, look, cut);
 }

@@ -46,10 +46,11 @@ double range_of(const std::string& text, Colouring colour) {
 /// "0 0.5 1" or "0ms, 5ms".
 std::vector<double> moments_of(const std::string& text, const RunSettings& run) {
   std::vector<double> moments;
-  std::string words = text;
-  std::ranges::replace(words, ',', ' ');
-  std::istringstream stream(words);
+  std::istringstream stream(text);
   for (std::string word; stream >> word;) {
+    if (word.ends_with(',')) {
+      word.pop_back();
+    }
     if (std::holds_alternative<DynamicRun>(run.kind)) {
       moments.push_back(parse_quantity(word, dimension::time));
     } else if (const auto number = parse_number(word)) {

@@ -207,8 +207,12 @@ void RunRecord::take(const Model& model, const State& state, const ElementFields
   if (is_motion && (!peak || peak->displacement < fields.largest_displacement)) {
     peak = {fields.largest_displacement, state.time};
   }
-  last = {fields.wall, fields.largest_displacement, fields.displacement_p99,
-          count_unresolved(model, state, most_bending), peak};
+  last = {fields.wall,
+          fields.largest_displacement,
+          fields.displacement_p99,
+          fields.solid_strain_p99,
+          count_unresolved(model, state, most_bending),
+          peak};
   if (!volume_before) {
     volume_before = state.volume;
   }
@@ -513,7 +517,7 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
 }
 
 /// @param touches  there is contact
-std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches) {
+std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, Integrator integrator) {
   std::vector<Warning> warnings;
   if (energy.gaining_step > 0) {
     warnings.push_back(
@@ -532,8 +536,10 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches) 
         {Weight::minor, "long steps",
          fmt::format(
              "time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
-             "of rest is not: for the motion take shorter steps, or integrator = \"generalised-alpha\"",
-             1e2 * energy.lost / energy.largest)});
+             "of rest is not: for the motion take shorter steps, or {}",
+             1e2 * energy.lost / energy.largest,
+             integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\""
+                                                      : "a larger spectral_radius")});
   }
   return warnings;
 }
@@ -550,6 +556,13 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
              "1 % of the wall is strained by more than {:.3g} %: linear elasticity is meant for strains of up to "
              "about 10 %",
              1e2 * last.wall.strain_p99)});
+  }
+  if (last.solid_strain_p99 > small_strain) {
+    warnings.push_back(
+        {Weight::major, "large strain",
+         fmt::format("1 % of the solids of law corotational is strained by more than {:.3g} %: that law is meant for "
+                     "strains of up to about 10 %: take law = \"neo-hookean\"",
+                     1e2 * last.solid_strain_p99)});
   }
   add_wall_notes(last.wall, warnings);
   constexpr double notable_departure = 0.05, large_departure = 0.2;
@@ -569,8 +582,9 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
                      snap.load_factor, snap.distance)});
   }
   if (summary.energy) {
-    std::ranges::move(energy_warnings(*summary.energy, !summary.contact_pressures.empty()),
-                      std::back_inserter(warnings));
+    std::ranges::move(
+        energy_warnings(*summary.energy, !summary.contact_pressures.empty(), std::get<DynamicRun>(run.kind).integrator),
+        std::back_inserter(warnings));
   }
   constexpr double notable_bend = 0.25;  // of what swings with half of the largest motion: a ninth of its period
   if (summary.largest_bend > notable_bend * summary.largest_motion) {

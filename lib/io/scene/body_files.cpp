@@ -167,7 +167,17 @@ RigidMesh load_shape(const SceneRigidMesh& mesh, const SceneRigid& rigid, BodyFi
 ShellBody load_shell(const SceneShell& shell, BodyFindings& found) {
   BodyMesh read = read_body_mesh(shell, found);
   const TriangleMesh& flat = read.file.mesh;
-  std::ranges::copy(seam_warnings(flat, examine(flat), shell.mesh, Weight::major), std::back_inserter(found.warnings));
+  const MeshFacts facts = examine(flat);
+  std::ranges::copy(seam_warnings(flat, facts, shell.mesh, Weight::major), std::back_inserter(found.warnings));
+  if (facts.non_manifold_vertices > 0) {
+    found.warnings.push_back(
+        {Weight::major, "parts meet in a point",
+         fmt::format("{}: {} of its vertices {} parts that touch nowhere else, the first {}: all "
+                     "force and moment between them passes there, and the stress around it grows "
+                     "with finer shells: separate the parts, or join them along edges",
+                     shell.mesh.string(), facts.non_manifold_vertices,
+                     facts.non_manifold_vertices == 1 ? "joins" : "join", facts.first_non_manifold_vertex)});
+  }
   ShellBody body;
   body.name = shell.name;
   body.said_at = shell.places.item.flag ? shell.mesh.string() : shell.places.item.text;

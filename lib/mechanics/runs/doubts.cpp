@@ -81,6 +81,18 @@ std::string meant(double value, std::initializer_list<double> factors, const std
   return list.empty() ? ": is its unit right?" : fmt::format(": was {} meant?", list);
 }
 
+/// Thickness times the sum of both curvatures over the area, mm^2, and the area: with its sign, since what the steps of
+/// an image leave bulges both ways.
+std::pair<double, double> thickness_by_radius(const ShellBody& body, const std::vector<Curvature>& curvatures) {
+  double whole = 0, by_radius = 0;
+  for (std::size_t t = 0; t < curvatures.size(); ++t) {
+    const double area = area_of(body.mesh, t);
+    whole += area;
+    by_radius += area * thickness_of(body, t) * curvatures[t].sum;
+  }
+  return {std::abs(by_radius), whole};
+}
+
 void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   const double most = *std::max_element(body.thickness.begin(), body.thickness.end());
   const std::vector<Curvature> curvatures = curvatures_of(body.mesh, body.curved);
@@ -100,14 +112,8 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
                      at(body.said_at, body.name), most, diagonal_mm)});
     return;
   }
-  // With its sign, in the mean over the area: what the steps of an image leave bulges both ways.
-  double whole = 0, thickness_by_radius = 0;
-  for (std::size_t t = 0; t < curvatures.size(); ++t) {
-    const double area = area_of(body.mesh, t);
-    whole += area;
-    thickness_by_radius += area * thickness_of(body, t) * curvatures[t].sum;
-  }
-  if (std::abs(thickness_by_radius) > thickest_curved * whole) {
+  const auto [by_radius, whole] = thickness_by_radius(body, curvatures);
+  if (by_radius > thickest_curved * whole) {
     found.push_back(
         {Weight::minor, "thick wall",
          fmt::format("{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
@@ -555,6 +561,16 @@ std::string pressure_text(double mpa) {
       std::ranges::find_if(units, [&](const auto& u) { return std::abs(mpa) >= 0.9999999 * u.first; });
   const auto& [size, name] = unit == units.end() ? units[mpa == 0 ? 3 : 4] : *unit;
   return fmt::format("{:.4g} {}", mpa / size, name);
+}
+
+double open_at_faces(const Model& model) {
+  double by_radius = 0, whole = 0;
+  for (const ShellBody& body : model.shells) {
+    const auto [of_body, area] = thickness_by_radius(body, curvatures_of(body.mesh, body.curved));
+    by_radius += of_body / 2;
+    whole += area;
+  }
+  return whole > 0 ? by_radius / whole : 0;
 }
 
 double share_without_inner_face(const ShellBody& body) {

@@ -27,6 +27,12 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
 /// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".
 std::string pressure_text(double mpa);
 
+/// How much of the stress at the faces of shells thin-shell theory leaves open, in the mean over the area: half of the
+/// thickness over a vessel's radius, all of it over a ball's. What bends by strain over radius is no bending there, and
+/// shells of different pattern count it differently. Source: Koiter 1960, "A consistent first approximation in the
+/// general theory of thin elastic shells". Errors: InputError: as curvatures_of(). Cost: linear.
+double open_at_faces(const Model& model);
+
 /// The part of a body's area on which the wall is thicker than twice the radius of curvature, so that no inner face is
 /// left. Errors: InputError: as curvatures_of(), or not one thickness, nor one per node.
 double share_without_inner_face(const ShellBody& body);

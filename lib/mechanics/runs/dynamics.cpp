@@ -594,7 +594,7 @@ public:
       : SteppedRun(system, settings, on_state, step_count(run)),
         run_(run),
         stepper_(system, settings, run),
-        turns_(model_),
+        turns_(model_, system.contact != nullptr),
         motion_{reference_configuration(system), Rates::zero(first_freedom(system.node_count()))} {}
 
 private:
@@ -637,7 +637,8 @@ private:
     std::size_t iterations = 0;
     std::size_t cg_iterations = 0;
     while (time_ != end) {
-      result = take_part(system_.contact ? turns_.next(time_, end, shortest_part * run_.step) : end);
+      const bool is_uneven = system_.contact || run_.adaptive;
+      result = take_part(is_uneven ? turns_.next(time_, end, shortest_part * run_.step) : end);
       iterations += result.iterations;
       cg_iterations += result.cg_iterations;
       tell_slow_step(iterations, fmt::format("{:.6g} s of {:.6g} s", time_, run_.duration),

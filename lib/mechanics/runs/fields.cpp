@@ -309,11 +309,17 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
 void ElementFieldEvaluator::Implementation::add_solids(const State& state, ElementFields& fields) const {
   std::vector<double> sums(model.node_count(), 0);
   std::vector<double> volumes(model.node_count(), 0);
+  std::vector<Facet> strains;
   for (const SolidElement& element : system.solids) {
     SolidMotion motion;
     for (int k = 0; k < 4; ++k) {
       motion.displacement.col(k) = state.displacement[element.nodes[k]];
       motion.pressure[k] = state.pressure[element.nodes[k]];
+    }
+    if (element.law == SolidLaw::corotational && !state.linear) {
+      const Mat3 stretch = Mat3::Identity() + motion.displacement * element.gradients.transpose();
+      const double strain = (stretch.transpose() * stretch - Mat3::Identity()).norm() / 2;
+      strains.push_back({element.volume, {strain, strain, strain}});
     }
     const Mat3 stress = solid_stress(element, motion, state.linear);
     const double mean = stress.trace() / 3;
@@ -325,6 +331,7 @@ void ElementFieldEvaluator::Implementation::add_solids(const State& state, Eleme
       volumes[node] += volume;
     }
   }
+  fields.solid_strain_p99 = strains.empty() ? 0 : area_quantile(strains, rare);
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     if (volumes[i] > 0) {
       fields.von_mises[i] = fields.membrane_stress[i] = sums[i] / volumes[i];

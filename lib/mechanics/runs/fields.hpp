@@ -63,6 +63,7 @@ struct ElementFields {
   double largest_displacement = 0;      ///< mm, of the curved surfaces, also between the nodes
   double displacement_p99 = 0;          ///< mm, what 1 % of the area of the shells exceeds
   std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
+  double solid_strain_p99 = 0;          ///< Green's, what 1 % of the volume of solids of law corotational exceeds
   std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
 };
 

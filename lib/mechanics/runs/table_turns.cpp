@@ -10,6 +10,7 @@ namespace {
 
 constexpr double of_a_place = 1e-9;  // of the largest value
 constexpr double of_a_load = 0.01;   // of the largest factor: loads bring about no more than themselves
+constexpr double of_a_pulse = 0.1;   // of the largest value: what lies within it error control finds
 
 Table<Vec3> table_of(const Ramp& ramp) {
   Table<Vec3> table;
@@ -38,7 +39,7 @@ double farthest_entry(const Table<Vec3>& table, double tolerance, double from, d
 
 }  // namespace
 
-TableTurns::TableTurns(const Model& model) {
+TableTurns::TableTurns(const Model& model, bool touches) {
   for (const RigidBody& body : model.rigids) {
     for (Table<Vec3>& table : tables_of(body)) {
       add(std::move(table), of_a_place);
@@ -46,11 +47,11 @@ TableTurns::TableTurns(const Model& model) {
   }
   for (const Fix& fix : model.fixes) {
     if (prescribes(fix)) {
-      add(table_of(fix.ramp), of_a_place);
+      add(table_of(fix.ramp), touches ? of_a_place : of_a_pulse);
     }
   }
   for (const Load& load : model.loads) {
-    add(table_of(load.ramp), of_a_load);
+    add(table_of(load.ramp), touches ? of_a_load : of_a_pulse);
   }
 }
 

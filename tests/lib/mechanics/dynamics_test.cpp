@@ -268,6 +268,17 @@ TEST(Adaptive, KeepsTheErrorWithTheStepsItNeeds) {
   }
 }
 
+/// Both ends of the step, and its middle, see no load.
+TEST(Adaptive, APulseWithinAStepIsFollowed) {
+  Cantilever strip;
+  const double t = strip.period;
+  strip.model.loads[0].ramp.points = {{0.04 * t, 0}, {0.06 * t, 1}, {0.08 * t, 0}};
+  const double truth = strip.tip(last_state(strip.model, strip.settings(Integrator::generalised_alpha, 1, 0.5, 1000)));
+  RunSettings settings = strip.settings(Integrator::generalised_alpha, 1, 0.5, 4);
+  std::get<DynamicRun>(settings.kind).adaptive = LengthTolerance{5e-7, false};
+  EXPECT_NEAR(strip.tip(last_state(strip.model, settings)), truth, 0.03 * std::abs(truth));
+}
+
 TEST(Adaptive, OneToleranceThatAnyStepMeetsChangesNothing) {
   const Cantilever strip;
   RunSettings settings = strip.settings(Integrator::generalised_alpha, 0.8, 0.5, 40);

@@ -44,6 +44,24 @@ double cantilever(std::size_t n, SolidLaw law, bool linear) {
   return mean / (bending + load * length / (shear * side * side * 5 / 6));
 }
 
+/// A bar pulled to twice its length, all of it by the same: Green's strain is (4 - 1) / 2, and what its sides contract.
+TEST(SolidBody, SaysHowFarItIsStrainedBeyondItsLaw) {
+  for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::neo_hookean}) {
+    Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1, 0, law);
+    hold_nodes(
+        model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
+    hold_nodes(
+        model, 0, [](const Vec3& x) { return x.y() < eps; }, "y");
+    hold_nodes(
+        model, 0, [](const Vec3& x) { return x.z() < eps; }, "z");
+    move_nodes(
+        model, 0, [](const Vec3& x) { return x.x() > 1 - eps; }, [](const Vec3&) { return Vec3(1, 0, 0); });
+    const double strain =
+        element_fields(model, last_state(model, nonlinear_run({0.25, 0.5, 0.75, 1}))).solid_strain_p99;
+    EXPECT_NEAR(strain, law == SolidLaw::corotational ? 1.5 : 0, 0.1);
+  }
+}
+
 TEST(SolidCantilever, ConvergesToBeamTheory) {
   std::vector<double> errors;
   for (const std::size_t n : {2, 4, 8}) {

@@ -99,6 +99,8 @@ class Picture(SimulateTest):
         # 1 % of the side in the middle, nothing at the rim: all colours of the bar.
         self.assertGreater(self.part_near(SAND), 0.02)
         self.assertGreater(self.part_near(VIOLET), 0.02)
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--picture-at", "1", "--magnify", "10", "--force")
+        self.assertGreater(self.part_near(VIOLET), 0.02, "what the modes are of was drawn")
         self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--colour", "stress", "--force",
                       code=2, says="no stress")
 
@@ -156,7 +158,7 @@ class Picture(SimulateTest):
         refused("exists", "--picture", "there.png", code=5)
 
     def test_moments_and_cuts_that_are_none_are_refused(self):
-        for flag, value, said in (("at", "soon", "'soon' is not a number"), ("at", ",", "one to 24 moments"), ("at", "1 " * 25, "not 25"),
+        for flag, value, said in (("at", "soon", "'soon' is not a number"), ("at", " ", "one to 24 moments"), ("at", "0,5 1", "'0,5' is not a number"), ("at", "1 " * 25, "not 25"),
                                   ("cut", "w", "is no axis with a place"), ("cut", "y=3", "unit"), ("cut", "yy", "is no axis")):
             with self.subTest(flag=flag, value=value):
                 self.run_tool(*BALL, "--picture", "out.png", f"--picture-{flag}={value}", code=2, says=[f"--picture-{flag}: ", said])

@@ -100,6 +100,18 @@ class Sides(SimulateTest):
         self.assertEqual(self.kinds(report)[0], "open seam")
         self.assertIn("--repair", report["warnings"][0])
 
+    def test_parts_that_share_one_vertex_are_said(self):
+        vertices, triangles, normals = (np.array(x) for x in self.ball)
+        top = int(np.argmax(vertices[:, 2]))
+        other = triangles + len(vertices)
+        other[other == top + len(vertices)] = top
+        mirrored = vertices * [1, 1, -1] + [0, 0, 2 * vertices[top, 2]]
+        write_ply(self.path("two.ply"), np.vstack([vertices, mirrored]), np.vstack([triangles, other[:, ::-1]]),
+                  np.vstack([normals, normals * [1, 1, -1]]))
+        # No normal is right for both.
+        report = self.run_tool("two.ply", "out.hdf", *FLAGS, code=3, says="touch nowhere else")
+        self.assertIn("parts meet in a point", self.kinds(report))
+
     def test_a_glb_is_in_the_unit_that_is_stated(self):
         vertices, triangles, _ = self.ball
         write_glb(self.path("ball.glb"), vertices, triangles)
