@@ -7,6 +7,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/core/require.hpp"
+#include "tunica/mechanics/model/selection.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
@@ -46,28 +47,27 @@ struct Region {
 /// Those of loads and fixes that name nodes, in their order.
 std::vector<Region> regions_of(const Model& model) {
   std::vector<Region> regions;
-  const auto look = [&](std::size_t body, const std::vector<Index>& nodes, bool is_load) {
-    if (body >= model.shells.size() || nodes.empty()) {
-      return;
-    }
+  const auto look = [&](std::size_t body, const std::vector<double>& shares, bool is_load) {
     const ShellMesh& mesh = model.shells[body].mesh;
-    const std::vector<char> within = triangles_within(mesh, nodes);
     double inside = 0, whole = 0;
-    for (std::size_t t = 0; t < within.size(); ++t) {
+    for (std::size_t t = 0; t < shares.size(); ++t) {
       const auto& [a, b, c] = mesh.triangles[t];
       const double area = triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
       whole += area;
-      inside += within[t] != 0 ? area : 0;
+      inside += shares[t] * area;
     }
     regions.push_back({inside / whole, is_load ? inside / whole : 1 - inside / whole});
   };
   for (const Load& load : model.loads) {
-    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
-      look(load.body, pressure->nodes, true);
+    const auto* const pressure = std::get_if<PressureLoad>(&load.kind);
+    if (pressure != nullptr && !pressure->shares.empty() && load.body < model.shells.size()) {
+      look(load.body, pressure->shares, true);
     }
   }
   for (const Fix& fix : model.fixes) {
-    look(fix.body, fix.nodes, false);
+    if (fix.body < model.shells.size()) {
+      look(fix.body, whole_triangles(model.shells[fix.body].mesh.triangles, fix.nodes), false);
+    }
   }
   return regions;
 }

@@ -132,6 +132,14 @@ private:
   std::set<Edge> rim_;
 };
 
+/// The quarters of a triangle that lies inside or outside do so, too; those of one that is cut are where they are.
+void carry_shares(const std::vector<double>& from, std::vector<double>& to) {
+  for (std::size_t t = 0; t < to.size(); ++t) {
+    const double share = share_of(from, t / 4);
+    to[t] = share == 0 || share == 1 ? share : to[t];
+  }
+}
+
 }  // namespace
 
 void carry_selections(const Model& coarse, const Level& level, Model& fine) {
@@ -143,20 +151,25 @@ void carry_selections(const Model& coarse, const Level& level, Model& fine) {
     carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
   }
   for (std::size_t i = 0; i < coarse.supports.size(); ++i) {
-    carriers[coarse.supports[i].body].carry(coarse.supports[i].nodes, fine.supports[i].nodes);
+    carry_shares(coarse.supports[i].shares, fine.supports[i].shares);
   }
   for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
     const Carrier& carrier = carriers[coarse.loads[i].body];
     const auto& from = coarse.loads[i].kind;
     auto& to = fine.loads[i].kind;
-    if (const auto* pressure = std::get_if<PressureLoad>(&from); pressure != nullptr && !pressure->nodes.empty()) {
-      carrier.carry(pressure->nodes, std::get<PressureLoad>(to).nodes);
+    if (const auto* pressure = std::get_if<PressureLoad>(&from)) {
+      carry_shares(pressure->shares, std::get<PressureLoad>(to).shares);
     } else if (const auto* force = std::get_if<ForceLoad>(&from)) {
       carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
     } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
       carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);
     } else if (const auto* edge = std::get_if<EdgeLoad>(&from)) {
-      carrier.carry(edge->edges, std::get<EdgeLoad>(to).edges);
+      auto& halves = std::get<EdgeLoad>(to);
+      carrier.carry(edge->edges, halves.edges);
+      halves.shares.clear();
+      for (const double share : edge->shares) {
+        halves.shares.insert(halves.shares.end(), 2, share);
+      }
     }
   }
 }

@@ -80,7 +80,7 @@ std::string result_picture(const Model& model, const std::vector<PicturedState>&
     moments.back().others = std::move(rigids);
     moments.back().when = when;
   }
-  const auto is_left = [&](const Vec3& p) { return !cut || cut->normal.dot(p) <= cut->offset; };
+  const auto is_left = [&](const Vec3& p) { return !cut || cut->beyond(p) <= 0; };
   const bool shows = std::ranges::any_of(
       moments, [&](const PictureMoment& moment) { return std::ranges::any_of(moment.surface.vertices, is_left); });
   look.title = shows ? quantity.title : "The cut leaves nothing: all bodies lie beyond it";

@@ -536,10 +536,13 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
   warn_of(subject, run_warnings(settings.scene.run, without, last), context);
   constexpr double notable = 0.02;
   if (const double open = open_at_faces(model); open > notable) {
-    context.note(fmt::format(
-        "stress at the faces: the theory of thin shells itself is uncertain by about half of the thickness over the "
-        "radius, {} here in the mean over the wall, beside any error of the mesh; the membrane stress is not concerned",
-        percent_text(open)));
+    context.note(
+        fmt::format("stress at the faces: the theory of thin shells itself is uncertain by about {} in the mean over "
+                    "the wall (half "
+                    "of the thickness over the radius of a vessel, all of it of a ball), beside any error of the mesh; "
+                    "the membrane "
+                    "stress is not concerned",
+                    percent_text(open)));
   }
   warn_of(subject, contact_warnings(record), context);
   if (recorded.crossing()) {

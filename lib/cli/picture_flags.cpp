@@ -66,19 +66,18 @@ std::vector<double> moments_of(const std::string& text, const RunSettings& run) 
 }
 
 /// "y", "-y" or "z=12mm": the axis to whose side all is left away, and from where on.
-std::pair<Vec3, std::optional<double>> cut_of(std::string text) {
-  const double sign = text.starts_with('-') ? -1 : 1;
-  const std::string axis = text.substr(sign < 0 ? 1 : 0, 1);
-  const std::string rest = text.substr(std::min(text.size(), axis.size() + (sign < 0 ? 1 : 0)));
-  const std::size_t k = std::string_view("xyz").find(axis);
-  if (axis.empty() || k == std::string_view::npos || !(rest.empty() || rest.starts_with('='))) {
+std::pair<Vec3, std::optional<double>> cut_of(std::string_view text) {
+  std::string_view rest = text;
+  const double sign = rest.starts_with('-') ? -1 : 1;
+  rest.remove_prefix(sign < 0 ? 1 : 0);
+  const std::size_t axis = rest.empty() ? std::string_view::npos : std::string_view("xyz").find(rest.front());
+  if (axis == std::string_view::npos || (rest.size() > 1 && rest[1] != '=')) {
     throw UsageError(fmt::format("'{}' is no axis with a place, such as y, -y or z=12mm", text));
   }
-  const Vec3 normal = sign * Vec3::Unit(narrow<Eigen::Index>(k));
-  if (rest.empty()) {
-    return {normal, {}};
-  }
-  return {normal, sign * parse_quantity(rest.substr(1), dimension::length)};
+  const Vec3 normal = sign * Vec3::Unit(narrow<Eigen::Index>(axis));
+  rest.remove_prefix(1);
+  return {normal, rest.empty() ? std::optional<double>()
+                               : sign * parse_quantity(std::string(rest.substr(1)), dimension::length)};
 }
 
 /// What `parse` makes of a flag's text. Errors: UsageError, with the flag.

@@ -5,6 +5,11 @@
 
 namespace tunica {
 
+bool is_unit(const Vec3& vector) {
+  constexpr double rounding = 1e-9;
+  return std::abs(vector.norm() - 1) < rounding;
+}
+
 double rounded_upwards(double value, int digits) {
   if (!std::isfinite(value) || !(value > 0)) {
     return value;

@@ -173,6 +173,7 @@ struct Twin {
   std::string_view known;  ///< the meaning of the unit that tunica has
 };
 constexpr std::array twins{Twin{"mPa", "millipascal", "Pa", 1e-3, "megapascal"},
+                           Twin{"Mbar", "megabar", "MPa", 1e5, "millibar"},
                            Twin{"MN", "meganewton", "kN", 1e3, "millinewton"}};
 
 /// A unit that tunica does not read, in one that it does: exact, so that no other one is taken for it.

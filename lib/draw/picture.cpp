@@ -2,6 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/require.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/draw/detail/canvas.hpp"
 #include "tunica/draw/detail/shading.hpp"
 #include "tunica/draw/detail/svg_text.hpp"
@@ -66,7 +67,7 @@ bool turned_inside_out(const TriangleMesh& mesh, const std::vector<Index>& used)
   return volume < 0;
 }
 
-/// One panel.
+/// What is drawn, once per view.
 struct Shown {
   const TriangleMesh* surface;
   const std::vector<double>* values;
@@ -74,14 +75,14 @@ struct Shown {
   const TriangleMesh* others;
   const TriangleMesh* outline;  // or none
   std::string when = {};
-  View view = {};
+  std::vector<View> views = {};
 };
 
 // What the views are fitted to. Other bodies may be far larger than the surface: they are cut at half its size around.
 std::vector<Vec3> points_to_see(const std::vector<Shown>& shown, const std::optional<PictureCut>& cut) {
   std::vector<Vec3> points;
   const auto add = [&](const Vec3& p) {
-    if (!cut || cut->normal.dot(p) <= cut->offset) {
+    if (!cut || cut->beyond(p) <= 0) {
       points.push_back(p);
     }
   };
@@ -113,17 +114,14 @@ std::vector<std::array<Vec3, 2>> cut_lines(std::span<const std::array<Vec3, 2>> 
                                            const std::optional<PictureCut>& cut) {
   std::vector<std::array<Vec3, 2>> left;
   for (auto [from, to] : lines) {
-    const auto height = [&](const Vec3& p) { return cut ? cut->normal.dot(p) - cut->offset : 0; };
-    if (height(from) > height(to)) {
+    double at_from = cut ? cut->beyond(from) : 0, at_to = cut ? cut->beyond(to) : 0;
+    if (at_from > at_to) {
       std::swap(from, to);
+      std::swap(at_from, at_to);
     }
-    if (height(from) > 0) {
-      continue;
+    if (at_from <= 0) {
+      left.push_back({from, at_to > 0 ? Vec3(from + at_from / (at_from - at_to) * (to - from)) : to});
     }
-    if (height(to) > 0) {
-      to = from + height(from) / (height(from) - height(to)) * (to - from);
-    }
-    left.push_back({from, to});
   }
   return left;
 }
@@ -136,8 +134,8 @@ public:
     for (const Shown& one : shown_) {
       const std::vector<double>& values = *one.values;
       for (const Index v : used_vertices(*one.surface)) {
-        if (!values.empty() && std::isfinite(values[v]) && (worst_among_ == nullptr || values[v] > largest_)) {
-          worst_among_ = &values;
+        if (!values.empty() && std::isfinite(values[v]) && (worst_ == nullptr || values[v] > largest_)) {
+          worst_ = &one;
           worst_at_ = one.surface->vertices[v];
           largest_ = values[v];
         }
@@ -153,17 +151,16 @@ public:
     box_ = {36, headed ? 120.0 : 36.0, paint_.plain ? picture_width - 36.0 : 1310.0, picture_height - 66.0};
   }
 
-  /// From two opposite sides; there are two panels.
+  /// One thing from two opposite sides.
   void look_from_both_sides() {
     const auto views = opposite_views(points_to_see(shown_, {}), box_, oversampling);
-    shown_[0].view = views[0];
-    shown_[1].view = views[1];
+    shown_.front().views = {views.begin(), views.end()};
   }
 
   void look_at_moments(const std::optional<PictureCut>& cut) {
     const auto views = views_of_moments(points_to_see(shown_, cut), shown_.size(), cut, box_, oversampling);
     for (std::size_t i = 0; i < views.size(); ++i) {
-      shown_[i].view = views[i];
+      shown_[i].views = {views[i]};
     }
   }
 
@@ -190,24 +187,29 @@ private:
     }
     std::vector<double> values = one.values->empty() ? std::vector<double>(first, 0) : *one.values;
     values.resize(all.vertices.size(), std::nan(""));
-    const Camera& camera = one.view.camera;
-    const double pixel = 1 / camera.scale;
-    const Raster raster = rasterise(all, shading_normals(all), values, camera, one.surface->triangles.size());
-    Image image = shaded(raster, paint_, 14 * pixel);
-    draw_lines(image, raster, camera, cut_lines(one.lines, camera.cut), 4 * pixel);
-    if (one.outline != nullptr && !one.outline->triangles.empty()) {
-      draw_outline(image, rasterise(*one.outline, shading_normals(*one.outline), {}, camera));
+    const auto normals = shading_normals(all);
+    const bool is_outlined = one.outline != nullptr && !one.outline->triangles.empty();
+    const auto normals_of_outline = is_outlined ? shading_normals(*one.outline) : decltype(normals)();
+    for (const View& view : one.views) {
+      const Camera& camera = view.camera;
+      const double pixel = 1 / camera.scale;
+      const Raster raster = rasterise(all, normals, values, camera, one.surface->triangles.size());
+      Image image = shaded(raster, paint_, 14 * pixel);
+      draw_lines(image, raster, camera, cut_lines(one.lines, camera.cut), 4 * pixel);
+      if (is_outlined) {
+        draw_outline(image, rasterise(*one.outline, normals_of_outline, {}, camera));
+      }
+      const Box2& panel = view.panel;
+      canvas_.halved_image(image, truncated<int>(std::round(panel.left)), truncated<int>(std::round(panel.top)));
+      if (has_largest() && worst_ == &one) {
+        ring_largest(view, raster, 6 * pixel);
+      }
+      draw_axes(view);
+      canvas_.text(one.when, (panel.left + panel.right) / 2, panel.bottom + 34, letter_size, black, Align::centre);
     }
-    const Box2& panel = one.view.panel;
-    canvas_.halved_image(image, truncated<int>(std::round(panel.left)), truncated<int>(std::round(panel.top)));
-    if (has_largest() && worst_among_ == one.values) {
-      ring_largest(one.view, raster, 6 * pixel);
-    }
-    draw_axes(one.view);
-    canvas_.text(one.when, (panel.left + panel.right) / 2, panel.bottom + 34, letter_size, black, Align::centre);
   }
 
-  [[nodiscard]] bool has_largest() const { return worst_among_ != nullptr && largest_ > 0; }
+  [[nodiscard]] bool has_largest() const { return worst_ != nullptr && largest_ > 0; }
 
   void ring(double x, double y) {
     canvas_.circle(x, y, 13, 6, white);
@@ -216,8 +218,7 @@ private:
 
   // In a view that shows the place.
   void ring_largest(const View& view, const Raster& raster, double tolerance) {
-    const std::optional<PictureCut>& cut = view.camera.cut;
-    if (cut && cut->normal.dot(worst_at_) > cut->offset) {
+    if (view.camera.cut && view.camera.cut->beyond(worst_at_) > 0) {
       return;
     }
     const Vec3 seen = view.camera.project(worst_at_);
@@ -263,7 +264,7 @@ private:
     constexpr double gap = 44;
     const double base = picture_height - 20;
     const double middle = base - 8;
-    const double pixels_per_mm = shown_[0].view.camera.scale / oversampling;
+    const double pixels_per_mm = shown_[0].views[0].camera.scale / oversampling;
     const double length = round_below(200 / pixels_per_mm);
     double x = box_.left + 4;
     const auto tell = [&](const std::string& text) {
@@ -330,7 +331,7 @@ private:
   std::vector<Shown> shown_;
   const PictureOptions& options_;
   Canvas canvas_;
-  const std::vector<double>* worst_among_ = nullptr;  ///< the values of which the largest is one
+  const Shown* worst_ = nullptr;  ///< what has the largest value
   Vec3 worst_at_ = Vec3::Zero();
   double largest_ = 0;
   bool ringed_ = false;  ///< one of the views shows it
@@ -364,19 +365,17 @@ std::string surface_picture(const TriangleMesh& surface, const std::vector<doubl
   require_drawable(options.outline);
   require_drawable(options.lines);
   require_valid(options);
-  const Shown shown{&surface, &values, options.lines, &options.others, &options.outline};
-  PictureDrawing drawing({shown, shown}, options);
+  PictureDrawing drawing({{&surface, &values, options.lines, &options.others, &options.outline}}, options);
   drawing.look_from_both_sides();
   return drawing.png();
 }
 
 std::string moments_picture(const std::vector<PictureMoment>& moments, const PictureOptions& options,
                             const std::optional<PictureCut>& cut) {
-  constexpr double rounding_of_units = 1e-9;
   if (moments.empty()) {
     throw InputError("a picture of moments needs one at least");
   }
-  if (cut && !(std::abs(cut->normal.norm() - 1) < rounding_of_units && std::isfinite(cut->offset))) {
+  if (cut && !(is_unit(cut->normal) && std::isfinite(cut->offset))) {
     throw InputError("the normal of a cut is no unit vector, or its place not finite");
   }
   require_valid(options);

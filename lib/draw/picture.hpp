@@ -50,10 +50,13 @@ struct PictureMoment {
   std::string when;  ///< written below it
 };
 
-/// What of the surface lies beyond a plane is not drawn: normal . p > offset.
+/// What of the surface lies beyond a plane is not drawn.
 struct PictureCut {
   Vec3 normal;        ///< unit
   double offset = 0;  ///< mm
+
+  /// mm: above zero it is not drawn.
+  [[nodiscard]] double beyond(const Vec3& p) const { return normal.dot(p) - offset; }
 };
 
 /// Adds the faces at which a plane cuts tetrahedra open. @param tetrahedra  between vertices of the moment's surface,

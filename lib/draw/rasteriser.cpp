@@ -184,7 +184,7 @@ Raster rasterise(const TriangleMesh& mesh, const std::vector<std::array<Vec3, 3>
         at.normal[i] = to_camera * normals[t][i];
         at.value[i] = values.empty() ? 0 : values[v];
         if (camera.cut && t < one_sided_from) {
-          at.beyond[i] = camera.cut->normal.dot(mesh.vertices[v]) - camera.cut->offset;
+          at.beyond[i] = camera.cut->beyond(mesh.vertices[v]);
         }
       }
       draw_triangle(raster, projected[t], at, first, last);

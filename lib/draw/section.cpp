@@ -9,7 +9,7 @@ void add_section(const PictureCut& cut, const std::vector<std::array<std::size_t
                  PictureMoment& moment) {
   constexpr double inward = 1e-6;  // of an edge: the plane itself is not cut away
   TriangleMesh& surface = moment.surface;
-  const auto height = [&](std::size_t v) { return cut.normal.dot(surface.vertices[v]) - cut.offset; };
+  const auto height = [&](std::size_t v) { return cut.beyond(surface.vertices[v]); };
   for (const auto& corners : tetrahedra) {
     std::vector<std::size_t> beyond;
     std::vector<std::size_t> within;

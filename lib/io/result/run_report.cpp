@@ -506,6 +506,11 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
     warnings.push_back({Weight::note, "whole wall counted",
                         "all of the wall lies within two bending lengths sqrt(R t) of rims, supports, point loads or "
                         "jumps of the thickness, so nothing of it is left out of the numbers of the wall"});
+  } else if (constexpr double most = 0.5; wall.left_out > most) {
+    warnings.push_back({Weight::note, "little of the wall counted",
+                        fmt::format("{:.0f} % of the wall lies within two bending lengths sqrt(R t) of rims, supports, "
+                                    "point loads or jumps of the thickness: the numbers of the wall are of the rest",
+                                    100 * wall.left_out)});
   }
   constexpr double notable = 1.05;
   if (wall.is_max_on_held && wall.whole.stress_max > notable * wall.whole.stress_p99) {

@@ -39,16 +39,16 @@ Load resolve_load(const Scene& scene, const SceneLoad& load, std::size_t body_nu
   Load result{body_number, load.kind, load.ramp, said_at(scene, load.places.item)};
   if (load.where) {
     const std::string& where = load.places.of("where").text;
-    const std::vector<Index> nodes = nodes_of(body, *load.where, where);
     if (auto* pressure = std::get_if<PressureLoad>(&result.kind)) {
-      require_triangle(body, nodes, where);
-      pressure->nodes = nodes;
+      pressure->shares = shares_of(body, *load.where, where);
     } else if (auto* force = std::get_if<ForceLoad>(&result.kind)) {
-      force->nodes = nodes;
+      force->nodes = nodes_of(body, *load.where, where);
     } else if (auto* moment = std::get_if<MomentLoad>(&result.kind)) {
-      moment->nodes = nodes;
+      moment->nodes = nodes_of(body, *load.where, where);
     } else if (auto* edge = std::get_if<EdgeLoad>(&result.kind)) {
-      edge->edges = edges_of(body, nodes, where);
+      SelectedEdges selected = edges_of(body, *load.where, where);
+      edge->edges = std::move(selected.edges);
+      edge->shares = std::move(selected.shares);
     }
   }
   return result;
@@ -336,10 +336,10 @@ Model resolve_scene(const Scene& scene, SceneBodies parts) {
   }
   for (const SceneSupport& support : scene.supports) {
     const std::size_t b = body_index(scene, support.body, support.places);
-    const std::string& where = support.places.of("where").text;
-    const std::vector<Index> nodes = nodes_of(bodies[b], support.where.value_or(AllNodes{}), where);
-    require_triangle(bodies[b], nodes, where);
-    model.supports.push_back({b, nodes, support.stiffness, support.normal_only, said_at(scene, support.places.item)});
+    std::vector<double> shares =
+        shares_of(bodies[b], support.where.value_or(AllNodes{}), support.places.of("where").text);
+    model.supports.push_back(
+        {b, std::move(shares), support.stiffness, support.normal_only, said_at(scene, support.places.item)});
   }
   hold_the_rest(scene, model);
   for (const SceneLoad& load : scene.loads) {

@@ -27,7 +27,7 @@ std::string without_quotes(std::string text) {
 }
 
 /// A cell of a table.
-std::string cell(const std::string& text) {
+std::string cell(std::string_view text) {
   std::string safe;
   for (const char c : text) {
     safe += c == '|' ? "\\|" : std::string(1, c);
@@ -42,10 +42,11 @@ std::string help_of_key(std::string_view section, std::string_view key) {
   for_all_keys([&](std::string_view of, std::string_view, const auto& keys) {
     const auto found = std::ranges::find(keys, key, [](const auto& one) { return one.name; });
     if (of == section && found != keys.end()) {
-      const bool is_choice = found->like.find(" | ") != std::string::npos;
-      help = !is_choice ? found->says
-                        : fmt::format("{}{}{} (default {})", found->says, found->says.empty() ? "" : ": ",
-                                      without_quotes(found->like), without_quotes(found->fallback()));
+      const bool is_choice = found->access->like().find(" | ") != std::string::npos;
+      help = !is_choice
+                 ? std::string(found->says)
+                 : fmt::format("{}{}{} (default {})", found->says, found->says.empty() ? "" : ": ",
+                               without_quotes(std::string(found->access->like())), without_quotes(found->fallback()));
     }
   });
   return help;
@@ -57,13 +58,16 @@ std::string scene_manual() {
     manual += fmt::format("\n### `{}`\n\n| key | value | default | |\n|---|---|---|---|\n", header);
     std::set<std::array<std::string_view, 3>> said;  // what several kinds share
     for (const auto& key : keys) {
-      const bool is_new = said.insert({key.name, key.like, ""}).second;
-      const bool says_more = said.insert({key.name, key.like, key.says}).second;
+      const std::string_view like = key.access->like();
+      const bool is_new = said.insert({key.name, like, ""}).second;
+      const bool says_more = said.insert({key.name, like, key.says}).second;
       if (is_new || says_more) {
-        const std::string otherwise = key.is_needed ? "needed" : key.fallback ? "`" + key.fallback() + "`" : "";
-        const std::string range = key.range ? ", " + key.range->text() : "";
-        manual += fmt::format("| `{}` | `{}`{} | {} | {} |\n", key.name, cell(key.like), range, cell(otherwise),
-                              cell(key.says));
+        const std::string fallback = key.fallback();
+        const std::string otherwise = key.is_needed ? "needed" : fallback.empty() ? "" : "`" + fallback + "`";
+        const std::optional<Range> limits = key.access->range();
+        const std::string range = limits ? ", " + limits->text() : "";
+        manual +=
+            fmt::format("| `{}` | `{}`{} | {} | {} |\n", key.name, cell(like), range, cell(otherwise), cell(key.says));
       }
     }
   });

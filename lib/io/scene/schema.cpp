@@ -73,19 +73,28 @@ std::string without_steps(std::string_view key, const Run& run) {
              : of_other_run(key, std::holds_alternative<FrequencyRun>(run.kind) ? "nonlinear" : "static", run);
 }
 
-/// The geometry of a run that has no linear one. @param otherwise  says so
+/// The geometry of a run that has no linear one.
 template <typename Kind>
-SceneKeys<Kind> nonlinear(void (*otherwise)(const Place&)) {
-  const Form<bool> linear = form::choice<bool>({{"nonlinear", false}, {"linear", true}});
-  SceneKey<Kind> key{"geometry", "", linear.like};
-  key.read = [=](const SceneTable& table, const toml::node& node, Kind&) {
+struct NonlinearOnly : KeyAccess<Kind> {
+  using Refusal = void (*)(const Place&);
+
+  Form<bool> linear = form::choice<bool>({{"nonlinear", false}, {"linear", true}});
+  Refusal refuse;
+
+  explicit NonlinearOnly(Refusal with) : refuse(with) {}
+  [[nodiscard]] std::string_view like() const override { return linear.like; }
+  void read(const SceneTable& table, const toml::node& node, Kind&) const override {
     if (linear.read(table, node, "geometry")) {
-      otherwise(table.at(node));
+      refuse(table.at(node));
     }
-  };
-  key.write = [=](const Kind&, const Writing& to) { return linear.write(false, to); };
-  return {key};
-}
+  }
+  [[nodiscard]] std::string write(const Kind&, const Writing& to) const override { return linear.write(false, to); }
+
+  static SceneKeys<Kind> keys(Refusal with) {
+    const auto access = std::make_shared<const NonlinearOnly>(with);
+    return {{"geometry", "", access}};
+  }
+};
 
 bool in_equal_steps(const StaticRun& run) { return run.load_factors == equal_load_factors(run.load_factors.size()); }
 
@@ -155,11 +164,12 @@ SceneKeys<Run> kind_keys() {
           "geometry", &StaticRun::linear, form::choice<bool>({{"nonlinear", false}, {"linear", true}}),
           "static, frequencies; linear: one solve with the stiffness of the reference, without what it bears already")},
       [](auto& run) { return static_part(run); }, of_runs("static"));
-  add(nonlinear<ArcLengthRun>([](const Place& place) {
+  add(NonlinearOnly<ArcLengthRun>::keys([](const Place& place) {
         place.fail("a linear run has no path to follow: remove control = \"arc-length\"");
       }),
       "static");
-  add(nonlinear<DynamicRun>([](const Place& place) { place.fail_later("geometry = \"linear\" in a dynamic run"); }),
+  add(NonlinearOnly<DynamicRun>::keys(
+          [](const Place& place) { place.fail_later("geometry = \"linear\" in a dynamic run"); }),
       "static");
   keys.push_back(key("control", &Run::kind,
                      form::one_of_kinds<RunKind>({{"load", StaticRun{}}, {"arc-length", ArcLengthRun{}}}),
@@ -392,7 +402,7 @@ SceneKeys<SceneFix> fix_keys() {
 SceneKeys<SceneSupport> support_keys() {
   using Support = SceneSupport;
   return {key("body", &Support::body, name).needed(),
-          key("where", &Support::where, form::selection(), "else all of it"),
+          key("where", &Support::where, form::selection(), "the region that lies in the bed; else all of it"),
           key("stiffness", &Support::stiffness, form::quantity(dimension::bedding, "N/m3", "\"1e5N/m3\"").in(positive),
               "stiffness of the tissue around, an elastic bed per area, e.g. 1e5N/m3; without force in the shape given")
               .needed(),
@@ -417,8 +427,8 @@ SceneKeys<PressureLoad> pressure_keys() {
 }
 
 /// Of the kinds of load that have one: where it acts.
-SceneKey<SceneLoad> where_key(std::string says, bool of_pressure) {
-  return key("where", &SceneLoad::where, form::selection(), std::move(says)).refused([=](const SceneLoad& load) {
+SceneKey<SceneLoad> where_key(std::string_view says, bool of_pressure) {
+  return key("where", &SceneLoad::where, form::selection(), says).refused([=](const SceneLoad& load) {
     const bool on_all = std::holds_alternative<AreaLoad>(load.kind) || std::holds_alternative<GravityLoad>(load.kind);
     return !on_all && of_pressure == std::holds_alternative<PressureLoad>(load.kind)
                ? ""
@@ -430,9 +440,9 @@ SceneKeys<SceneLoad> load_keys() {
   using Kind = decltype(SceneLoad::kind);
   SceneKeys<SceneLoad> keys{
       key("body", &SceneLoad::body, name).needed(),
-      where_key("of a force, moment or edge load: the nodes that carry it", false)
+      where_key("of a force or moment: the nodes that carry it; of an edge load: the part of the boundary", false)
           .needed(" (which nodes carry the load)"),
-      where_key("of a pressure: on the triangles with all nodes in it; else on all", true),
+      where_key("of a pressure: the region it acts on, cut out of the triangles; else all of the surface", true),
       key("kind", &SceneLoad::kind,
           kind_of<Kind, PressureLoad, ForceLoad, MomentLoad, EdgeLoad, AreaLoad, GravityLoad>(), "see Loads")
           .needed()
@@ -443,8 +453,8 @@ SceneKeys<SceneLoad> load_keys() {
         [](std::string_view key, const SceneLoad&) { return fmt::format("{} belongs to a pressure: remove it", key); });
   };
   const auto add_value = [&]<typename Load>(Vec3 Load::*value, Dimension dimension, std::string_view unit,
-                                            std::string_view like, std::string says) {
-    add(SceneKeys<Load>{key("value", value, form::vector(dimension, unit, like), std::move(says)).needed()});
+                                            std::string_view like, std::string_view says) {
+    add(SceneKeys<Load>{key("value", value, form::vector(dimension, unit, like), says).needed()});
   };
   add(pressure_keys());
   add_value(&ForceLoad::total, dimension::force, "N", R"(["0N", "0N", "-1N"])",
@@ -463,23 +473,28 @@ SceneKeys<SceneLoad> load_keys() {
 
 // ---- what is between them, and what is asked
 
+/// Written where the body that carries has sides.
+struct AttachedSide : MemberAccess<SceneAttach, Attachment::Side SceneAttach::*, Attachment::Side> {
+  using MemberAccess::MemberAccess;
+
+  [[nodiscard]] std::string write(const SceneAttach& attach, const Writing& to) const override {
+    const bool is_to_shell =
+        to.scene == nullptr || std::ranges::count(to.scene->shells, attach.to, &SceneShell::name) > 0;
+    return is_to_shell ? MemberAccess::write(attach, to) : "";
+  }
+};
+
 SceneKeys<SceneAttach> attach_keys() {
   using Attach = SceneAttach;
   const Form<Attachment::Side> side = form::choice<Attachment::Side>();
-  SceneKeys<Attach> keys{
-      key("body", &Attach::body, name).needed(),
-      key("where", &Attach::where, form::selection(true),
-          "also {touching = \"0.1mm\"}: nodes at most that far from `side`; all other forms attach up to a shell's "
-          "length away")
-          .needed(),
-      key("to", &Attach::to, name, "the body that carries them").needed(),
-      key("side", &Attach::side, side,
-          "where on the wall of a shell `touching` measures; what is carried keeps its distance")};
-  keys.back().write = [side](const Attach& attach, const Writing& to) {
-    const bool to_shell = std::ranges::count(to.scene->shells, attach.to, &SceneShell::name) > 0;
-    return to_shell ? side.write(attach.side, to) : "";
-  };
-  return keys;
+  return {key("body", &Attach::body, name).needed(),
+          key("where", &Attach::where, form::selection(true),
+              "also {touching = \"0.1mm\"}: nodes at most that far from `side`; all other forms attach up to a shell's "
+              "length away")
+              .needed(),
+          key("to", &Attach::to, name, "the body that carries them").needed(),
+          {"side", "where on the wall of a shell `touching` measures; what is carried keeps its distance",
+           std::make_shared<const AttachedSide>("side", &Attach::side, side)}};
 }
 
 SceneKeys<SceneContact> contact_keys() {

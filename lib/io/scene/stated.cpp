@@ -29,13 +29,13 @@ Json known_or_null(const std::optional<double>& value, double scale = 1) {
 }
 
 // As the user wrote it; empty: not known.
-std::string text_of(const Places& places, std::string_view key) {
+std::string typed_text(const Places& places, std::string_view key) {
   const auto place = places.keys.find(key);
   return place == places.keys.end() ? "" : place->second.typed;
 }
 
 Json typed(const Places& places, std::string_view key) {
-  const std::string text = text_of(places, key);
+  const std::string text = typed_text(places, key);
   return text.empty() ? Json() : Json(text);
 }
 
@@ -128,8 +128,8 @@ std::string stated_line(const Scene& scene) {
   std::set<std::string> others;
   for (const SceneLoad& load : scene.loads) {
     if (std::holds_alternative<PressureLoad>(load.kind)) {
-      pressures.insert(text_of(load.places, "value"));
-      imaged.insert(text_of(load.places, "imaged_at"));
+      pressures.insert(typed_text(load.places, "value"));
+      imaged.insert(typed_text(load.places, "imaged_at"));
     } else {
       others.emplace(name_of(load.kind));
     }
@@ -146,8 +146,8 @@ std::string stated_line(const Scene& scene) {
     }
     return values;
   };
-  say("wall", of_shells([](const SceneShell& shell) { return text_of(shell.places, "thickness"); }));
-  say("E", of_shells([](const SceneShell& shell) { return text_of(shell.places, "young"); }));
+  say("wall", of_shells([](const SceneShell& shell) { return typed_text(shell.places, "thickness"); }));
+  say("E", of_shells([](const SceneShell& shell) { return typed_text(shell.places, "young"); }));
   say("Poisson's ratio",
       of_shells([](const SceneShell& shell) { return fmt::format("{:g}", shell.material.poisson); }));
   std::string line = fmt::format("{}", fmt::join(parts, ", "));

@@ -40,22 +40,6 @@ template struct Table<Vec3>;
 
 double Ramp::at(double time) const { return points.empty() ? 1 : Table<double>{points}.at(time); }
 
-std::vector<char> triangles_within(const ShellMesh& mesh, const std::vector<Index>& nodes) {
-  std::vector<char> chosen(mesh.vertices.size(), 0);
-  for (const Index node : nodes) {
-    if (node >= chosen.size()) {
-      throw InputError(fmt::format("there is no node {}: the mesh has {}", node, chosen.size()));
-    }
-    chosen[node] = 1;
-  }
-  std::vector<char> within;
-  within.reserve(mesh.triangles.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    within.push_back(chosen[a] & chosen[b] & chosen[c]);
-  }
-  return within;
-}
-
 bool Model::is_imaged_under_pressure() const {
   return std::any_of(loads.begin(), loads.end(), [](const Load& load) {
     const auto* pressure = std::get_if<PressureLoad>(&load.kind);

@@ -204,14 +204,14 @@ struct RigidMotionsFix {
 /// An elastic bed of a shell: a force per area of -stiffness times the displacement from the reference.
 struct Support {
   std::size_t body = 0;
-  std::vector<Index> nodes;  ///< on the triangles whose nodes are all among these
-  double stiffness = 0;      ///< MPa/mm
-  bool normal_only = false;  ///< of the displacement only the part along the reference normal
+  std::vector<double> shares;  ///< of each triangle, 0 to 1: the part of its area that lies in the bed; empty: all
+  double stiffness = 0;        ///< MPa/mm
+  bool normal_only = false;    ///< of the displacement only the part along the reference normal
   std::string said_at{};
 };
 
-/// Per triangle: whether all its nodes are among some. Errors: InputError: there is no such node.
-std::vector<char> triangles_within(const ShellMesh& mesh, const std::vector<Index>& nodes);
+/// A part of each of some triangles or edges: of one of them, and no number where all are meant.
+inline double share_of(const std::vector<double>& shares, std::size_t i) { return shares.empty() ? 1 : shares[i]; }
 
 /// Pressure along the outward normals (positive: along them).
 struct PressureLoad {
@@ -220,7 +220,7 @@ struct PressureLoad {
   bool follower = true;               ///< turns and grows with the surface
   std::optional<double> imaged_at{};  ///< MPa, under which the shells were imaged: the load begins there
   bool unload = false;                ///< the shape without that pressure is to be found, and the load begins at zero
-  std::vector<Index> nodes{};         ///< on the triangles (faces) whose nodes are all among these; empty: on all
+  std::vector<double> shares{};       ///< of each triangle (face), 0 to 1: the part it presses; empty: all
 
   /// MPa, at a factor of the load: from what it begins with to `value`.
   [[nodiscard]] double at(double factor) const {
@@ -243,6 +243,7 @@ struct EdgeLoad {
   static constexpr std::string_view name = "edge";
   std::vector<std::array<Index, 2>> edges;
   Vec3 per_length = Vec3::Zero();  ///< N / mm, integrated consistently
+  std::vector<double> shares{};    ///< of each edge, 0 to 1: the part that it acts on; empty: all
 };
 struct AreaLoad {
   static constexpr std::string_view name = "area";

@@ -200,33 +200,185 @@ std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, 
   return nodes;
 }
 
-std::vector<std::array<Index, 2>> edges_of(const SelectableBody& body, const std::vector<Index>& nodes,
-                                           const std::string& said_at) {
-  std::vector<std::array<Index, 2>> edges;
-  const std::set<Index> chosen(nodes.begin(), nodes.end());
-  for (const auto& edge : body.boundary_edges()) {
-    if (chosen.count(edge[0]) != 0 && chosen.count(edge[1]) != 0) {
-      edges.push_back(edge);
-    }
+namespace {
+
+/// Half of space: normal * x <= offset.
+struct HalfSpace {
+  Vec3 normal;
+  double offset;
+};
+
+std::vector<HalfSpace> half_spaces(const BoxNodes& box) {
+  std::vector<HalfSpace> all;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    all.push_back({Vec3::Unit(axis), box.upper[axis]});
+    all.push_back({-Vec3::Unit(axis), -box.lower[axis]});
   }
-  if (edges.empty()) {
-    throw InputError(
-        fmt::format("{}: no boundary edge has both its ends among the {} selected nodes", said_at, nodes.size()));
-  }
-  return edges;
+  return all;
 }
 
-void require_triangle(const SelectableBody& body, const std::vector<Index>& nodes, const std::string& said_at) {
-  std::vector<char> chosen(body.vertices().size(), 0);
-  for (const Index node : nodes) {
-    chosen[node] = 1;
+std::vector<HalfSpace> half_spaces(const HalfSpaceNodes& half) {
+  const double sign = half.below ? 1 : -1;
+  return {{sign * Vec3::Unit(half.axis), sign * half.at}};
+}
+
+/// Where a segment enters and leaves a region, as parts of the way; 0, 0: nowhere.
+std::pair<double, double> inner_part(const std::vector<HalfSpace>& region, const Vec3& from, const Vec3& to) {
+  double enters = 0, leaves = 1;
+  for (const auto& [normal, offset] : region) {
+    const double at_from = normal.dot(from) - offset, at_to = normal.dot(to) - offset;
+    if (at_from > 0 && at_to > 0) {
+      return {0, 0};
+    }
+    if (at_from > 0) {
+      enters = std::max(enters, at_from / (at_from - at_to));
+    } else if (at_to > 0) {
+      leaves = std::min(leaves, at_from / (at_from - at_to));
+    }
   }
-  const bool any = std::ranges::any_of(
-      body.triangles(), [&](const auto& t) { return (chosen[t[0]] & chosen[t[1]] & chosen[t[2]]) != 0; });
-  if (!any) {
+  return enters < leaves ? std::pair(enters, leaves) : std::pair(0.0, 0.0);
+}
+
+/// A line from p along d and the sphere |x| = radius.
+template <typename Vector>
+std::pair<double, double> inner_part(double radius, const Vector& p, const Vector& d) {
+  const double a = d.squaredNorm(), b = p.dot(d), root = b * b - a * (p.squaredNorm() - radius * radius);
+  if (!(root > 0) || !(a > 0)) {
+    return {0, 0};
+  }
+  return {std::clamp((-b - std::sqrt(root)) / a, 0.0, 1.0), std::clamp((-b + std::sqrt(root)) / a, 0.0, 1.0)};
+}
+
+std::pair<double, double> inner_part(const SphereNodes& ball, const Vec3& from, const Vec3& to) {
+  return inner_part<Vec3>(ball.radius, from - ball.centre, to - from);
+}
+
+/// Source: Sutherland, Hodgman, "Reentrant polygon clipping", CACM 17, 1974.
+double inner_area(const std::vector<HalfSpace>& region, const std::array<Vec3, 3>& corners) {
+  std::vector<Vec3> polygon(corners.begin(), corners.end());
+  for (const auto& [normal, offset] : region) {
+    std::vector<Vec3> clipped;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Vec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+      const double at_p = normal.dot(p) - offset, at_q = normal.dot(q) - offset;
+      if (at_p <= 0) {
+        clipped.push_back(p);
+      }
+      if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
+        clipped.emplace_back(p + at_p / (at_p - at_q) * (q - p));
+      }
+    }
+    polygon = std::move(clipped);
+  }
+  Vec3 twice = Vec3::Zero();
+  for (std::size_t i = 2; i < polygon.size(); ++i) {
+    twice += (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]);
+  }
+  return twice.norm() / 2;
+}
+
+/// In the triangle's plane: edge by edge what a disc and the triangle of the edge and its centre have in common, with
+/// its sign.
+double inner_area(const SphereNodes& ball, const std::array<Vec3, 3>& corners) {
+  const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
+  const double height = normal.dot(corners[0] - ball.centre), squared = ball.radius * ball.radius - height * height;
+  if (!(squared > 0)) {
+    return 0;
+  }
+  const Vec3 centre = ball.centre + height * normal;
+  const auto twice = [&](const Vec3& p, const Vec3& q) { return normal.dot(p.cross(q)); };
+  const auto sector = [&](const Vec3& p, const Vec3& q) { return squared * std::atan2(twice(p, q), p.dot(q)); };
+  double area = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 p = corners[k] - centre, q = corners[(k + 1) % 3] - centre;
+    const auto [enters, leaves] = inner_part<Vec3>(std::sqrt(squared), p, q - p);
+    const Vec3 in = p + enters * (q - p), out = p + leaves * (q - p);
+    area += (sector(p, in) + twice(in, out) + sector(out, q)) / 2;
+  }
+  return area;
+}
+
+template <typename Form>
+inline constexpr bool is_region =
+    std::is_same_v<Form, BoxNodes> || std::is_same_v<Form, HalfSpaceNodes> || std::is_same_v<Form, SphereNodes>;
+
+/// What its area or length is measured with.
+inline const SphereNodes& convex(const SphereNodes& ball) { return ball; }
+template <typename Form>
+std::vector<HalfSpace> convex(const Form& form) {
+  return half_spaces(form);
+}
+
+constexpr double hardly_any = 1e-9;  // of a triangle or an edge: rounding
+
+}  // namespace
+
+std::vector<double> whole_triangles(std::span<const std::array<Index, 3>> triangles, const std::vector<Index>& nodes) {
+  const std::set<Index> chosen(nodes.begin(), nodes.end());
+  std::vector<double> shares;
+  for (const auto& corners : triangles) {
+    shares.push_back(std::ranges::all_of(corners, [&](Index v) { return chosen.contains(v); }) ? 1 : 0);
+  }
+  return shares;
+}
+
+std::vector<double> shares_of(const SelectableBody& body, const Selection& where, const std::string& said_at) {
+  if (std::holds_alternative<AllNodes>(where)) {
+    return {};
+  }
+  const std::vector<Index> nodes = std::visit([&](const auto& form) { return select(body, form, said_at); }, where);
+  std::vector<double> shares = whole_triangles(body.triangles(), nodes);  // regions are convex
+  std::visit(
+      [&]<typename Form>(const Form& form) {
+        if constexpr (is_region<Form>) {
+          const auto& region = convex(form);
+          for (std::size_t t = 0; t < shares.size(); ++t) {
+            const auto& [a, b, c] = body.triangles()[t];
+            const std::array corners{body.vertices()[a], body.vertices()[b], body.vertices()[c]};
+            const double whole = triangle_area(corners[0], corners[1], corners[2]);
+            const double share = shares[t] > 0 || !(whole > 0) ? shares[t] : inner_area(region, corners) / whole;
+            shares[t] = share < hardly_any ? 0 : std::min(share, 1.0);
+          }
+        }
+      },
+      where);
+  if (std::ranges::all_of(shares, [](double share) { return share == 0; })) {
+    if (nodes.empty()) {
+      fail_empty(body, said_at, "");
+    }
     throw InputError(
         fmt::format("{}: no triangle has all its nodes among the {} selected: select more", said_at, nodes.size()));
   }
+  return shares;
+}
+
+SelectedEdges edges_of(const SelectableBody& body, const Selection& where, const std::string& said_at) {
+  const std::vector<Index> nodes = std::visit([&](const auto& form) { return select(body, form, said_at); }, where);
+  const std::set<Index> chosen(nodes.begin(), nodes.end());
+  SelectedEdges found;
+  for (const auto& edge : body.boundary_edges()) {
+    double share = chosen.contains(edge[0]) && chosen.contains(edge[1]) ? 1 : 0;
+    std::visit(
+        [&]<typename Form>(const Form& form) {
+          if constexpr (is_region<Form>) {
+            const auto [enters, leaves] = inner_part(convex(form), body.vertices()[edge[0]], body.vertices()[edge[1]]);
+            share = share > 0 ? share : leaves - enters;
+          }
+        },
+        where);
+    if (share > hardly_any) {
+      found.edges.push_back(edge);
+      found.shares.push_back(share);
+    }
+  }
+  if (found.edges.empty()) {
+    if (nodes.empty()) {
+      fail_empty(body, said_at, "");
+    }
+    throw InputError(
+        fmt::format("{}: no boundary edge has both its ends among the {} selected nodes", said_at, nodes.size()));
+  }
+  return found;
 }
 
 namespace {

@@ -3,6 +3,8 @@
 #include "tunica/mechanics/model/model.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
+#include <span>
+
 /// Where on a body something is held, loaded or carried, and which of its nodes these are.
 namespace tunica {
 
@@ -79,12 +81,21 @@ private:
 /// none, or one that does not exist or is listed twice.
 std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, const std::string& said_at);
 
-/// The boundary edges of a shell with both ends among the nodes, at least one. Errors: InputError.
-std::vector<std::array<Index, 2>> edges_of(const SelectableBody& body, const std::vector<Index>& nodes,
-                                           const std::string& said_at);
+/// Of each triangle whether all its nodes are among these: 1 or 0.
+std::vector<double> whole_triangles(std::span<const std::array<Index, 3>> triangles, const std::vector<Index>& nodes);
 
-/// Errors: InputError that begins with `said_at`: no triangle of the body's surface has all its nodes among these.
-void require_triangle(const SelectableBody& body, const std::vector<Index>& nodes, const std::string& said_at);
+/// Of each triangle of the body's surface the part of its area that lies in a region; where nodes are named, 1 if all
+/// its nodes are. Empty: all of it is meant. Errors: InputError that begins with `said_at`: nothing of it.
+std::vector<double> shares_of(const SelectableBody& body, const Selection& where, const std::string& said_at);
+
+/// Boundary edges of a shell, and the part of each that is meant.
+struct SelectedEdges {
+  std::vector<std::array<Index, 2>> edges;
+  std::vector<double> shares;
+};
+
+/// The boundary edges that lie in a region, or have both ends among nodes that are named. Errors: InputError: none.
+SelectedEdges edges_of(const SelectableBody& body, const Selection& where, const std::string& said_at);
 
 /// A loop of boundary edges of a shell.
 struct Rim {

@@ -1,5 +1,6 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/require.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
@@ -202,8 +203,25 @@ Vec3 numbers_of(const Load& load) {
       load.kind);
 }
 
+/// Parts of some triangles or edges. @param count  of these
+void check_shares(const std::vector<double>& shares, std::size_t count, const std::string& of) {
+  const auto is_share = [](double share) { return share >= 0 && share <= 1; };
+  if (!shares.empty() && (shares.size() != count || !std::ranges::all_of(shares, is_share))) {
+    throw InputError(fmt::format("{}: {} parts for {} triangles or edges: one from 0 to 1 for each is needed", of,
+                                 shares.size(), count));
+  }
+  if (!shares.empty() && std::ranges::all_of(shares, [](double share) { return share == 0; })) {
+    throw InputError(of + ": no part of a triangle or edge lies in the selection: select more");
+  }
+}
+
+/// How many triangles the surface of a body has.
+std::size_t face_count(const Model& model, std::size_t body) {
+  return model.is_solid(body) ? boundary_triangles(model.solids[body - model.shells.size()].mesh).size()
+                              : model.shells[body].mesh.triangles.size();
+}
+
 void check_rigid(const RigidBody& body) {
-  constexpr double rounding = 1e-9;  // as where scenes are checked
   for (const auto& table : tables_of(body)) {
     if (table.points.empty() || !is_table(table.points)) {
       refuse(body.said_at, body.name,
@@ -211,7 +229,7 @@ void check_rigid(const RigidBody& body) {
     }
   }
   const auto check_axis = [&](const Vec3& point, const Vec3& direction) {
-    if (!point.allFinite() || !(std::abs(direction.norm() - 1) < rounding)) {
+    if (!point.allFinite() || !is_unit(direction)) {
       refuse(body.said_at, body.name, "an axis of its shape or motion has no unit vector, or no finite point");
     }
   };
@@ -299,8 +317,7 @@ void check_selections(const Model& model) {
   for (const Fix& fix : model.fixes) {
     check(fix.body, fix.nodes, "fix");
     check_numbers(fix.displacement, fix.ramp, called(fix.said_at, "this fix on " + model.name_of(fix.body)));
-    constexpr double rounding = 1e-9;
-    if (fix.across && !(std::abs(fix.across->norm() - 1) < rounding)) {
+    if (fix.across && !is_unit(*fix.across)) {
       refuse(fix.said_at, "this fix on " + model.name_of(fix.body), "the plane of a slide has no unit normal");
     }
     if (fix.across && model.is_solid(fix.body)) {
@@ -308,17 +325,14 @@ void check_selections(const Model& model) {
     }
   }
   for (const Support& support : model.supports) {
-    check(support.body, support.nodes, "support");
+    check(support.body, {0}, "support");
     if (model.is_solid(support.body)) {
       refuse(model, support.body, "a bed supports shells, and this is a solid: hold it by a fix");
     }
     naming(called(support.said_at, "this support of " + model.name_of(support.body)),
            [&] { require_positive(support.stiffness, "the stiffness"); });
-    const std::vector<char> on = triangles_within(model.shells[support.body].mesh, support.nodes);
-    if (std::find(on.begin(), on.end(), 1) == on.end()) {
-      refuse(support.said_at, "this support of " + model.name_of(support.body),
-             "no triangle has all its nodes in the selection: select more");
-    }
+    check_shares(support.shares, model.shells[support.body].mesh.triangles.size(),
+                 called(support.said_at, "this support of " + model.name_of(support.body)));
   }
   for (const RigidMotionsFix& fix : model.rigid_motions) {
     check(fix.body, {0}, "fix of the rigid motions");
@@ -329,15 +343,22 @@ void check_selections(const Model& model) {
     std::visit(
         [&]<typename Kind>(const Kind& kind) {
           if constexpr (requires { kind.nodes; }) {
-            if (!std::is_same_v<Kind, PressureLoad> || !kind.nodes.empty()) {
-              check(load.body, kind.nodes, Kind::name);
-            }
+            check(load.body, kind.nodes, Kind::name);
           } else if constexpr (requires { kind.edges; }) {
             std::vector<Index> ends;
             for (const auto& edge : kind.edges) {
               ends.insert(ends.end(), edge.begin(), edge.end());
             }
             check(load.body, ends, "edge load");
+          }
+          if constexpr (requires { kind.shares; }) {
+            std::size_t count = 0;
+            if constexpr (requires { kind.edges; }) {
+              count = kind.edges.size();
+            } else {
+              count = face_count(model, load.body);
+            }
+            check_shares(kind.shares, count, called(load.said_at, "this load on " + model.name_of(load.body)));
           }
         },
         load.kind);

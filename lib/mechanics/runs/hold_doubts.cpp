@@ -8,6 +8,7 @@
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/meeting_walls.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 
@@ -84,11 +85,18 @@ std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& tou
       lumen.area += a.cross(b) / 2;
       lumen.centre += length * (a + b) / 2;
       lumen.length += length;
-      lumen.touched = lumen.touched || touched[rim[i]] != 0;
+      lumen.touched = lumen.touched || (!touched.empty() && touched[rim[i]] != 0);
     }
     lumen.centre /= lumen.length;
   }
   return lumens;
+}
+
+/// Whether a body is a sheet, such as a plate, whose rim goes around it and is no end of a vessel.
+bool is_sheet(const ShellMesh& mesh, const std::vector<Lumen>& lumens) {
+  constexpr double most_of_it = 0.7;  // of its area: half a ball has a lumen of half its area
+  const double whole = area(flat_facets(mesh));
+  return std::ranges::any_of(lumens, [&](const Lumen& lumen) { return lumen.area.norm() > most_of_it * whole; });
 }
 
 /// The rim that slides farthest from across the wall, of a body under pressure.
@@ -262,7 +270,7 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
     const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b));
     for (const Lumen& lumen : lumens) {
       const double roundness = lumen.area.norm() * 4 * std::numbers::pi / (lumen.length * lumen.length);
-      if (lumen.touched || roundness < least_roundness) {
+      if (lumen.touched || roundness < least_roundness || is_sheet(body.mesh, lumens)) {
         continue;
       }
       ++count;
@@ -306,7 +314,7 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
           return std::ranges::any_of(contact.between,
                                      [&](const ContactParty& party) { return !party.rigid && party.index == b; });
         });
-    if (pushed || pressure_on(model, b) == 0) {
+    if (pushed || pressure_on(model, b) == 0 || is_sheet(body.mesh, lumens_of(body.mesh, {}))) {
       continue;
     }
     const double thickness = *std::ranges::max_element(body.thickness);

@@ -249,7 +249,9 @@ double linear_departure(ShellSystem& system, const RunSettings& settings, const 
   TangentSolver solver(system, settings);
   VectorX none;
   // Beyond the buckling load: a strip pushed along itself shows nothing else of it.
-  const bool stable = solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite;
+  if (!solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite) {
+    return 1;
+  }
   const auto response_to = [&](VectorX left) {
     mask(solver.free(), left);
     VectorX response = VectorX::Zero(left.size());
@@ -287,9 +289,6 @@ double linear_departure(ShellSystem& system, const RunSettings& settings, const 
   aside = std::max(aside, bent_aside);
   if (!beyond.valid()) {
     return 1;
-  }
-  if (!stable) {
-    aside = std::max(aside, 1.0);
   }
   if (beyond.is_driven()) {  // the forces differ
     return std::max(aside, std::abs(first + second + third - 2 * second * second));

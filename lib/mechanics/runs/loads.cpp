@@ -16,34 +16,13 @@ std::array<Vec3, 3> reference_corners(const ShellElement& e) {
   return {e.from_centroid.col(0), e.from_centroid.col(1), e.from_centroid.col(2)};
 }
 
-/// The elements of a shell, or faces of a solid, all of whose nodes are among some; empty where all are meant.
-std::vector<char> pressed_parts(const ShellSystem& system, std::size_t body, const std::vector<Index>& nodes) {
-  const Model& model = *system.model;
-  if (nodes.empty()) {
-    return {};
-  }
-  if (!model.is_solid(body)) {
-    return triangles_within(model.shells[body].mesh, nodes);
-  }
-  std::vector<char> chosen(system.node_count(), 0);
-  for (const Index node : nodes) {
-    chosen[model.first_node(body) + node] = 1;
-  }
-  std::vector<char> on;
-  for (std::size_t f = system.surfaces.first[body]; f < system.surfaces.first[body + 1]; ++f) {
-    const auto& v = system.surfaces.faces[f].nodes;
-    on.push_back(std::all_of(v.begin(), v.end(), [&](Index i) { return chosen[i] != 0; }) ? 1 : 0);
-  }
-  return on;
-}
-
-/// A pressure of 1 MPa.
-void add_dead_pressure(const ShellSystem& system, std::size_t element, DeadLoad& load) {
+/// A pressure of 1 MPa on a part of an element.
+void add_dead_pressure(const ShellSystem& system, std::size_t element, double share, DeadLoad& load) {
   const ShellElement& e = system.elements[element];
   Vector9 force;
   unit_pressure(reference_corners(e), system.heights[element], force, nullptr);
   for (int k = 0; k < 3; ++k) {
-    load.force.segment<3>(first_freedom(e.nodes[k])) += force.segment<3>(3 * k);
+    load.force.segment<3>(first_freedom(e.nodes[k])) += share * force.segment<3>(3 * k);
   }
 }
 
@@ -75,25 +54,30 @@ Index used_node(const ShellSystem& system, std::size_t body, Index node) {
 /// Half at each end; across the edge it also works on the bow that rotations of its ends make (MembraneStiffness::bow),
 /// by which a membrane under constant stress is in balance with its edge load.
 void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& edge_load, DeadLoad& load) {
-  std::map<std::pair<Index, Index>, std::vector<std::pair<std::size_t, std::size_t>>> sides;  // of elements, by ends
-  for (const auto& edge : edge_load.edges) {
-    const Index a = used_node(system, body, edge[0]);
-    const Index b = used_node(system, body, edge[1]);
-    const double length = (system.reference[a] - system.reference[b]).norm();
+  struct Side {
+    double share;
+    std::vector<std::pair<std::size_t, std::size_t>> elements;  // and which of their edges
+  };
+  std::map<std::pair<Index, Index>, Side> sides;  // by their ends
+  for (std::size_t i = 0; i < edge_load.edges.size(); ++i) {
+    const Index a = used_node(system, body, edge_load.edges[i][0]);
+    const Index b = used_node(system, body, edge_load.edges[i][1]);
+    const double share = share_of(edge_load.shares, i);
+    const double length = share * (system.reference[a] - system.reference[b]).norm();
     load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
     load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
-    sides[std::minmax(a, b)];
+    sides[std::minmax(a, b)].share = share;
   }
   for (std::size_t e = system.first_element[body]; e < system.first_element[body + 1]; ++e) {
     for (std::size_t k = 0; k < 3; ++k) {
       const auto& nodes = system.elements[e].nodes;
       if (const auto side = sides.find(std::minmax(nodes[k], nodes[(k + 1) % 3])); side != sides.end()) {
-        side->second.emplace_back(e, k);
+        side->second.elements.emplace_back(e, k);
       }
     }
   }
-  for (const auto& [ends, elements] : sides) {
-    for (const auto& [e, k] : elements) {
+  for (const auto& [ends, side] : sides) {
+    for (const auto& [e, k] : side.elements) {
       const ShellElement& element = system.elements[e];
       const auto corners = reference_corners(element);
       const Vec3 along = element.axes * (corners[(k + 1) % 3] - corners[k]).normalized();
@@ -101,8 +85,8 @@ void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& 
       const double pull = (element.axes * edge_load.per_length).head<2>().dot(out);
       const double facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
       const Vec3 force(out.x() * out.x(), out.y() * out.y(), out.x() * out.y());  // the membrane force of a unit pull
-      const Vec3 moment = facet * pull * element.bow.col(narrow<Eigen::Index>(k)).dot(force) / real(elements.size()) *
-                          element.axes.row(2).transpose();
+      const Vec3 moment = side.share * facet * pull * element.bow.col(narrow<Eigen::Index>(k)).dot(force) /
+                          real(side.elements.size()) * element.axes.row(2).transpose();
       load.force.segment<3>(first_freedom(element.nodes[(k + 1) % 3]) + 3) += moment;
       load.force.segment<3>(first_freedom(element.nodes[k]) + 3) -= moment;
     }
@@ -110,8 +94,7 @@ void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& 
 }
 
 /// Pressure of 1 MPa that keeps its direction, or a force per area, on the surface of a solid.
-/// @param on  as PressedParts::on
-void add_solid_surface_load(const ShellSystem& system, const Load& load, const std::vector<char>& on, DeadLoad& dead) {
+void add_solid_surface_load(const ShellSystem& system, const Load& load, DeadLoad& dead) {
   const auto* pressure = std::get_if<PressureLoad>(&load.kind);
   const auto* area = std::get_if<AreaLoad>(&load.kind);
   if (pressure == nullptr && area == nullptr) {
@@ -119,13 +102,11 @@ void add_solid_surface_load(const ShellSystem& system, const Load& load, const s
   }
   const std::size_t first = system.surfaces.first[load.body];
   for (std::size_t f = first; f < system.surfaces.first[load.body + 1]; ++f) {
-    if (!on.empty() && on[f - first] == 0) {
-      continue;
-    }
+    const double share = pressure != nullptr ? share_of(pressure->shares, f - first) : 1;
     const auto& v = system.surfaces.faces[f].nodes;
     const Vec3 twice =
         (system.reference[v[1]] - system.reference[v[0]]).cross(system.reference[v[2]] - system.reference[v[0]]);
-    const Vec3 force = pressure != nullptr ? Vec3(twice / 6) : Vec3(twice.norm() / 6 * area->per_area);
+    const Vec3 force = pressure != nullptr ? Vec3(share * twice / 6) : Vec3(twice.norm() / 6 * area->per_area);
     for (const Index node : v) {
       dead.force.segment<3>(first_freedom(node)) += force;
     }
@@ -138,14 +119,16 @@ std::vector<double> summed(const ShellSystem& system, const std::vector<double>&
                            const Counts& counts) {
   const std::vector<std::size_t>& first = of_solids ? system.surfaces.first : system.first_element;
   std::vector<double> pressures(of_solids ? system.surfaces.faces.size() : system.elements.size(), 0);
-  for (const PressedParts& parts : system.pressed) {
-    const auto& pressure = std::get<PressureLoad>(system.model->loads[parts.load].kind);
-    if (system.model->is_solid(parts.body) != of_solids || !counts(pressure)) {
+  const std::vector<Load>& loads = system.model->loads;
+  for (std::size_t l = 0; l < loads.size(); ++l) {
+    const auto* const pressure = std::get_if<PressureLoad>(&loads[l].kind);
+    if (pressure == nullptr || system.model->is_solid(loads[l].body) != of_solids || !counts(*pressure)) {
       continue;
     }
-    const double value = pressure.at(factors[parts.load]);
-    for (std::size_t k = first[parts.body]; k < first[parts.body + 1]; ++k) {
-      pressures[k] += parts.on.empty() || parts.on[k - first[parts.body]] != 0 ? value : 0;
+    const double value = pressure->at(factors[l]);
+    const std::size_t begin = first[loads[l].body];
+    for (std::size_t k = begin; k < first[loads[l].body + 1]; ++k) {
+      pressures[k] += share_of(pressure->shares, k - begin) * value;
     }
   }
   return pressures;
@@ -163,15 +146,12 @@ void make_loads(ShellSystem& system) {
     const std::size_t begin = solid ? 0 : system.first_element[load.body];
     const std::size_t end = solid ? 0 : system.first_element[load.body + 1];
     const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    if (pressure != nullptr) {
-      system.pressed.push_back({l, load.body, pressed_parts(system, load.body, pressure->nodes)});
-      if (pressure->follower) {
-        continue;
-      }
+    if (pressure != nullptr && pressure->follower) {
+      continue;
     }
     dead.force = VectorX::Zero(first_freedom(system.node_count()));
     if (solid) {
-      add_solid_surface_load(system, load, pressure == nullptr ? std::vector<char>() : system.pressed.back().on, dead);
+      add_solid_surface_load(system, load, dead);
     }
     if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
       dead.director.assign(system.node_count(), Mat3::Zero());
@@ -179,11 +159,8 @@ void make_loads(ShellSystem& system) {
     if (pressure != nullptr) {
       dead.begin = pressure->at(0);
       dead.end = pressure->at(1);
-      const std::vector<char>& on = system.pressed.back().on;
       for (std::size_t e = begin; e < end; ++e) {
-        if (on.empty() || on[e - begin] != 0) {
-          add_dead_pressure(system, e, dead);
-        }
+        add_dead_pressure(system, e, share_of(pressure->shares, e - begin), dead);
       }
     } else if (const auto* area = std::get_if<AreaLoad>(&load.kind)) {
       for (std::size_t e = begin; e < end; ++e) {

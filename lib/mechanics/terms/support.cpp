@@ -13,7 +13,6 @@ SupportTerm::SupportTerm(const Model& model, std::span<const ShellElement> eleme
   stiffness_.assign(model.node_count(), Mat3::Zero());
   for (const Support& support : model.supports) {
     const ShellBody& body = model.shells[support.body];
-    const std::vector<char> selected = triangles_within(body.mesh, support.nodes);
     const std::vector<Mat3> shapes =
         support.normal_only ? shape_operators_of(body.mesh, body.curved) : std::vector<Mat3>();
     std::size_t triangle = 0;
@@ -22,12 +21,13 @@ SupportTerm::SupportTerm(const Model& model, std::span<const ShellElement> eleme
         continue;
       }
       const std::size_t t = triangle++;
-      if (selected[t] == 0) {
+      const double share = share_of(support.shares, t);
+      if (share == 0) {
         continue;
       }
       for (std::size_t k = 0; k < 3; ++k) {
         const Index node = elements[e].nodes[k];
-        const double stiffness = support.stiffness * elements[e].area / 3;
+        const double stiffness = share * support.stiffness * elements[e].area / 3;
         const Vec3& n = normals[e][k];
         if (support.normal_only) {
           sliding_.push_back({node, stiffness, n, shapes[t]});

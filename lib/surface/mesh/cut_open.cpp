@@ -3,6 +3,7 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
+#include "tunica/core/rounding.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 
 #include <algorithm>
@@ -153,9 +154,8 @@ private:
 }  // namespace
 
 TriangleMesh cut_open(const TriangleMesh& surface, const Vec3& normal, double offset) {
-  constexpr double rounding = 1e-9;
   require_valid(surface);
-  if (!(std::abs(normal.norm() - 1) < rounding) || !std::isfinite(offset)) {
+  if (!is_unit(normal) || !std::isfinite(offset)) {
     throw InputError("a plane to cut along has a unit normal and a finite offset");
   }
   return Cut(surface, normal, offset).run();

@@ -52,15 +52,14 @@ Vec3 middle_of(const TriangleMesh& mesh, const std::vector<Index>& rim) {
 // The faces of the image, 2 * axis + side, that a rim runs over: one if all of it lies on that.
 std::set<std::size_t> faces_of(const Mask& mask, const Mat3& to_index, const TriangleMesh& mesh,
                                const std::vector<Index>& rim) {
-  constexpr double on_face = 1e-6;  // rounding of index coordinates, in voxels
   std::array<std::size_t, 6> edges{};
   for (std::size_t i = 0; i < rim.size(); ++i) {
     const Vec3 middle = (mesh.vertices[rim[i]] + mesh.vertices[rim[(i + 1) % rim.size()]]) / 2;
     const Vec3 index = to_index * (middle - mask.affine().col(3));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double x = index[narrow<Eigen::Index>(axis)];
-      edges[2 * axis] += std::abs(x + 0.5) < on_face ? 1 : 0;
-      edges[2 * axis + 1] += std::abs(x - (real(mask.dims()[axis]) - 0.5)) < on_face ? 1 : 0;
+      edges[2 * axis] += std::abs(x + 0.5) < on_grid ? 1 : 0;
+      edges[2 * axis + 1] += std::abs(x - (real(mask.dims()[axis]) - 0.5)) < on_grid ? 1 : 0;
     }
   }
   std::set<std::size_t> faces;

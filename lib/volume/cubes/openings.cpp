@@ -78,8 +78,7 @@ public:
 
   /// The opening whose rim has a vertex of the surface, in voxel coordinates; none if it is not on this face.
   [[nodiscard]] std::size_t opening_at(const Vec3& index) const {
-    constexpr double on_face = 1e-6;  // rounding of index coordinates, in voxels
-    if (std::abs(index[axis_] - place()) > on_face) {
+    if (std::abs(index[axis_] - place()) > on_grid) {
       return no_opening;
     }
     const auto near = [](double x, std::size_t size) {

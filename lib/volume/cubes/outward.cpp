@@ -28,7 +28,6 @@ bool inside(const Mask& mask, bool open_border, const Vec3& index) {
 
 // The step from inside to outside at a point on the grid's edges: along each axis, from the voxel below to that above.
 Vec3 outward_step(const Mask& mask, bool open_border, const Vec3& point) {
-  constexpr double on_grid = 1e-6;  // rounding of index coordinates, in voxels
   const Vec3 nearest = point.array().round();
   Vec3 step = Vec3::Zero();
   const bool centre = ((point - nearest).cwiseAbs().array() < on_grid).all();

@@ -8,6 +8,9 @@
 
 namespace tunica {
 
+/// In voxels: how far rounding may take a coordinate from the grid, or from the image's faces, on which it lies.
+inline constexpr double on_grid = 1e-6;
+
 /// Which samples of a volume are inside, by what they mean (slope * v + intercept). NaN is outside, whatever the rule.
 struct Inside {
   enum class Rule {

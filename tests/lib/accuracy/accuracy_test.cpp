@@ -228,6 +228,8 @@ TEST(Estimates, APercentileThatAgreesByChanceIsNotBelieved) {
   Estimates found = estimate();
   const double membrane = found["membrane_p99_mpa"].error, mean = found["membrane_mean_mpa"].error;
   EXPECT_LT(membrane, 0.2);
+  EXPECT_TRUE(found["membrane_p99_mpa"].credible);
+  EXPECT_FALSE(found["stress_max_mpa"].credible) << "the value at one place";
   fields.wall.beside.membrane[1] *= 1.5;
   found = estimate();
   EXPECT_GT(found["membrane_p99_mpa"].error, membrane + 0.3);
@@ -321,14 +323,19 @@ TEST(Levels, WhatIsSelectedStaysSelected) {
   single.nodes = {5};
   coarse.fixes = {rim, single};
   Load edge;
-  edge.kind = EdgeLoad{{{2, 3}}, Vec3(0, 0, 1)};
-  coarse.loads = {edge};
+  edge.kind = EdgeLoad{{{2, 3}}, Vec3(0, 0, 1), {0.4}};
+  Load pressure;
+  pressure.kind = PressureLoad{.value = 1, .shares = {0, 0.3, 1, 1}};
+  coarse.loads = {edge, pressure};
   const Level level = finer_level(coarse.shells, {nullptr});
   Model fine = coarse;
   fine.shells = level.bodies;
   fine.fixes[0].nodes = {0};  // what the place finds of the rim after a refit has moved it
   fine.fixes[1].nodes = {4};
+  std::vector<double>& shares = std::get<PressureLoad>(fine.loads[1].kind).shares;
+  shares.assign(16, 0.5);
   carry_selections(coarse, level, fine);
+  EXPECT_THAT(shares, ::testing::ElementsAre(0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1, 1, 1, 1, 1));
   const auto halved = [&](Index a, Index b) {
     const auto& parents = level.parents.front();
     const auto found = std::find_if(parents.begin(), parents.end(), [&](const auto& pair) {
@@ -342,6 +349,7 @@ TEST(Levels, WhatIsSelectedStaysSelected) {
   const Index middle = halved(2, 3);
   const std::vector<std::array<Index, 2>> halves{{2, middle}, {middle, 3}};
   EXPECT_EQ(std::get<EdgeLoad>(fine.loads[0].kind).edges, halves);
+  EXPECT_THAT(std::get<EdgeLoad>(fine.loads[0].kind).shares, ::testing::ElementsAre(0.4, 0.4));
 }
 
 /// A sphere under a pressure that grows over `ramp` seconds; it breathes with a period that is known.

@@ -159,6 +159,8 @@ TEST(Quantity, OtherUnitsAreToldInThoseThatAreRead) {
 
 TEST(Quantity, WhatHasTwoMeaningsIsToldBoth) {
   EXPECT_THAT(refusal("3mpa", dimension::pressure), EndsWith("write 3MPa (megapascal) or 0.003Pa (millipascal)"));
+  EXPECT_THAT(refusal("3MBar", dimension::pressure), EndsWith("write 3mbar (millibar) or 300000MPa (megabar)"));
+  EXPECT_THAT(refusal("3mBar", dimension::pressure), EndsWith("write 3mbar"));
   EXPECT_THAT(refusal("3 mPa", dimension::pressure), EndsWith("write 3MPa (megapascal) or 0.003Pa (millipascal)"));
   EXPECT_THAT(refusal("2MN", dimension::force), EndsWith("write 2mN (millinewton) or 2000kN (meganewton)"));
   EXPECT_THAT(refusal("1,000mm", dimension::length),

@@ -4,6 +4,7 @@
 #include "benchmarks.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/solids/solid_element.hpp"
 
 #include <gtest/gtest.h>
@@ -210,6 +211,15 @@ TEST(Fields, StayOnTheirSideOfACrease) {
     }
   }
   EXPECT_NEAR(fields.wall.whole.stress_p99, 0.01, 1e-8);
+}
+
+/// Half of the thickness over the radius of a tube; a plate leaves nothing open.
+TEST(Fields, WhatIsOpenAtTheFacesIsThicknessOverRadius) {
+  EXPECT_NEAR(open_at_faces(tube(10, 10, 30, 40, 20, 0.8)), 0.04, 4e-4);
+  Model plate;
+  plate.shells.push_back(flat_body(make_grid(3, 3, [](double u, double v) { return Vec3(u, v, 0); }).mesh, 1, 0, 1));
+  EXPECT_EQ(open_at_faces(plate), 0);
+  EXPECT_EQ(open_at_faces(Model()), 0);
 }
 
 /// Four bending lengths of a tube that is clamped at both ends, and no more.

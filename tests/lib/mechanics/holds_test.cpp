@@ -1,6 +1,7 @@
 // What holds an organ beside fixed nodes: rims that slide in their planes, and elastic beds.
 
 #include "benchmarks.hpp"
+#include "tunica/mechanics/model/selection.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
@@ -64,9 +65,6 @@ void add_bed(Model& model, double stiffness, bool normal_only) {
   Support support;
   support.stiffness = stiffness;
   support.normal_only = normal_only;
-  for (std::size_t i = 0; i < model.shells[0].mesh.vertices.size(); ++i) {
-    support.nodes.push_back(static_cast<Index>(i));
-  }
   model.supports.push_back(support);
 }
 
@@ -336,20 +334,23 @@ TEST(Bed, IsRefusedWhereItMakesNoSense) {
   add_bed(model, -1, false);
   EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("stiffness"));
   model.supports[0].stiffness = 1;
-  model.supports[0].nodes = {0};
-  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("no triangle has all its nodes"));
-  model.supports[0].nodes = {100'000};
-  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("names node"));
+  std::vector<double>& shares = model.supports[0].shares;
+  shares.assign(model.shells[0].mesh.triangles.size(), 0);
+  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("no part of a triangle"));
+  shares[0] = 1.5;
+  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("one from 0 to 1 for each"));
+  shares = {1};
+  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("one from 0 to 1 for each"));
 }
 
-/// Half of a plate that is pressed bears half the force, in every form of pressure.
+/// A part of a plate that is pressed bears that part of the force, in every form of pressure, wherever triangles lie.
 TEST(PressureOn, APartOfABody) {
-  for (const bool follower : {true, false}) {
+  for (const auto& [follower, part] : {std::pair(true, 0.5), {false, 0.5}, {true, 0.3}, {false, 0.99}}) {
     Grid grid = make_grid(8, 8, [](double u, double v) { return Vec3(u, v, 0); });
     Model model;
     model.shells.push_back(flat_body(grid.mesh, 1000, 0.3, 0.01));
     PressureLoad load{3, follower};
-    load.nodes = nodes_where(grid.mesh, [](const Vec3& p) { return p.x() > 0.5 - eps; });
+    load.shares = shares_of(SelectableBody(model.shells[0]), HalfSpaceNodes{0, part, false}, "here");
     model.loads.push_back({0, load, {}});
     const ShellSystem system = make_system(model);
     Forces forces;
@@ -358,7 +359,7 @@ TEST(PressureOn, APartOfABody) {
     for (std::size_t i = 0; i < system.node_count(); ++i) {
       sum += forces.external[first_freedom(i) + 2];
     }
-    EXPECT_NEAR(std::abs(sum), 1.5, 1e-9);
+    EXPECT_NEAR(std::abs(sum), 3 * (1 - part), 1e-9);
   }
 }
 

@@ -1,8 +1,10 @@
 // Bodies of tetrahedra against analytic and published solutions.
 
 #include "tets.hpp"
+#include "tunica/mechanics/model/selection.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 #include "tunica/mechanics/solids/solid_element.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -274,7 +276,7 @@ TEST(SolidPressure, AThickTubeOfTetrahedraBearsWhatOneOfShellsBears) {
     const std::vector<Index> inside =
         nodes_of(solid, 0, [](const Vec3& x) { return x.head<2>().norm() < inner + eps; });
     Load load{0, PressureLoad{-pressure, true}, {}};
-    std::get<PressureLoad>(load.kind).nodes = inside;
+    std::get<PressureLoad>(load.kind).shares = whole_triangles(boundary_triangles(solid.solids[0].mesh), inside);
     solid.loads.push_back(load);
     const TubeOfTetrahedra tube = blown(solid, last_state(solid, nonlinear_run({0.5, 1})), inner, thickness);
     EXPECT_NEAR(tube.hoop, pressure * tube.inner / (tube.outer - tube.inner), 0.005 * tube.hoop);

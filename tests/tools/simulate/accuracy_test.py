@@ -71,9 +71,8 @@ kind = "pressure"
 value = "1kPa"
 where = {above = {axis = "z", at = "2mm"}}
 """)
-        exact = 0.2294  # by meshes with rings of nodes at both borders
-        claim = self.run_tool("--scene", "scene.toml", "out.hdf", "--max-shells", "6000", code=4,
-                              says="accuracy not reached")["result"]["accuracy"]
+        exact = 0.2152  # by meshes with rings of nodes at both borders, 2,232 to 12,864 shells
+        claim = self.run_tool("--scene", "scene.toml", "out.hdf", "--max-shells", "6000")["result"]["accuracy"]
         self.assertLess(abs(claim["value"] / exact - 1), claim["estimate_percent"] / 100)
 
     def test_membrane_stress_that_the_linear_model_has_not(self):

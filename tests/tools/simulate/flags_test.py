@@ -10,6 +10,7 @@ import unittest
 import h5py
 import numpy as np
 
+from meshes import tube
 from support import SimulateTest, grid, sphere, write_ply
 
 MATERIAL = ["--young", "1MPa", "--poisson", "0.3", "--thickness", "0.5mm"]
@@ -34,6 +35,7 @@ class Flags(SimulateTest):
 
     def test_report_holds_the_keys_of_the_contract(self):
         report = self.run_tool("ball.ply", "out.hdf", *HELD)
+        self.assertIn("is uncertain by about 5 % in the mean", self.done.stderr)  # thickness over radius
         self.assertEqual(list(report["result"]), RESULT_KEYS)
         result = report["result"]
         self.assertEqual((result["shells"], result["tetrahedra"], result["nodes"]), (80, 0, 42))
@@ -49,6 +51,14 @@ class Flags(SimulateTest):
         self.assertEqual(report["outputs"], [{"path": name, "sha256": hashlib.sha256(pathlib.Path(self.path(name)).read_bytes()).hexdigest()}
                                              for name in ("out.hdf", "out.page")])
         self.assertEqual(os.listdir(self.folder).count("out.hdf.part"), 0)
+
+    def test_a_note_says_where_little_of_the_wall_is_counted(self):
+        write_ply(self.path("tube.ply"), *tube(24, 8, radius=10, length=12))  # 2 sqrt(R t) = 4.5 mm at either end
+        report = self.run_tool("tube.ply", "out.hdf", *PRESSED, "--fix", "boundary", "--static")
+        share = report["result"]["wall"]["left_out_percent"]
+        self.assertGreater(share, 50)
+        self.assertLess(share, 90)
+        self.assertIn(f"{share:.0f} % of the wall lies within two bending lengths", self.done.stderr)
 
     def test_open_body_has_no_volume(self):
         result = self.run_tool("plate.ply", "out.hdf", *PRESSED, "--fix", "boundary", "--static")["result"]

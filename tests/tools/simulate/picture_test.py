@@ -139,6 +139,8 @@ class Picture(SimulateTest):
             self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--picture-at", "1", *words, "--force")
             covered[words] = np.mean(self.pixels()[VIEW].min(axis=2) < 250)
         self.assertGreater(covered[("--picture-cut=-y",)], 0.5 * covered[()], "the section has no face")
+        self.run_tool("--scene", "scene.toml", "out.hdf", "--picture", "out.png", "--picture-cut=-y=100mm", "--force")
+        self.assertEqual(np.mean(self.pixels()[300:700, 300:1100].min(axis=2) < 250), 0, "something lies beyond the cut")
 
     def test_what_is_refused(self):
         def refused(message, *arguments, code=2):

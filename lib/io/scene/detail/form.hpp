@@ -36,7 +36,7 @@ inline constexpr Range positive{0, infinity, "{key} must be greater than zero"};
 inline constexpr Range not_negative{0, infinity, "{key} must not be negative", true};
 
 /// A function that its copies share. Functions of a row hold those of its parts, which hold those of theirs: copied as
-/// wholes, they would take a second under the sanitizers.
+/// wholes, each would hold all of them anew.
 template <typename Signature>
 class Shared {
 public:

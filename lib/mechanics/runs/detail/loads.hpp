@@ -4,7 +4,7 @@
 
 namespace tunica {
 
-/// Fills `dead` and `pressed` from the model's loads; elements, masses and surfaces are there.
+/// Fills `dead` from the model's loads; elements, masses and surfaces are there.
 /// Errors: InputError: a load on a node that no element uses.
 void make_loads(ShellSystem& system);
 

@@ -44,13 +44,6 @@ struct Piece {
   Mat3 turns = Mat3::Identity();
 };
 
-/// What a pressure acts on.
-struct PressedParts {
-  std::size_t load = 0;
-  std::size_t body = 0;
-  std::vector<char> on;  ///< per element, or face of a solid, of the body; empty: on all
-};
-
 /// Elements that are computed at once; those beyond `count` repeat another.
 struct Batch {
   std::array<Index, lane_count> elements{};
@@ -80,7 +73,6 @@ struct ShellSystem {
   std::shared_ptr<ContactSystem> contact;  ///< none where nothing touches
 
   std::vector<DeadLoad> dead;                      ///< per load; empty vectors for follower pressure
-  std::vector<PressedParts> pressed;               ///< per pressure, also those that keep their direction
   std::shared_ptr<const SupportTerm> bed;          ///< none where nothing is supported
   std::vector<std::shared_ptr<const Term>> terms;  ///< all that acts, as make_terms() says
 

@@ -154,6 +154,21 @@ TEST(Picture, ASectionOfATetrahedronLiesInTheCutAndFacesTheViewerWithLinearValue
   }
 }
 
+TEST(Picture, AxesHaveTheLettersOfTheSpace) {
+  const TriangleMesh ball = make_sphere(20, 3);
+  const Image plain = picture(ball, {}, {});
+  const Image patient = picture(ball, {}, {.axes = "LPS"});
+  std::size_t other = 0;
+  for (int y = 0; y < plain.height; ++y) {
+    for (int x = 0; x < plain.width; ++x) {
+      const bool differs = brightness(pixel(plain, x, y)) != brightness(pixel(patient, x, y));
+      other += differs ? 1 : 0;
+      EXPECT_TRUE(!differs || y > plain.height / 2) << "the axes stand below";
+    }
+  }
+  EXPECT_GT(other, 50U);
+}
+
 TEST(Picture, ARangeMakesTheColoursOfTwoPicturesTheSame) {
   const TriangleMesh sphere = make_sphere(20, 4);
   std::vector<double> small = bump(sphere, {0, -1, 0});

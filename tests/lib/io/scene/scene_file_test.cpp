@@ -4,6 +4,7 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/scene/detail/toml_depth.hpp"
 #include "tunica/io/scene/scene_manual.hpp"
+#include "tunica/io/scene/stated.hpp"
 
 #include <gmock/gmock.h>
 
@@ -44,6 +45,18 @@ TEST_F(SceneTest, DefaultsAreThoseOfTheContract) {
   EXPECT_EQ(scene.shells[0].bending, Bending::dkt_comas);
   EXPECT_EQ(scene.shells[0].rest, Rest::curved);
   EXPECT_FALSE(scene.shells[0].material.density);
+}
+
+TEST_F(SceneTest, ALineSaysLoadsAndWallAsTheyWereWrittenWhereAllBodiesAgree) {
+  const std::string pressed =
+      "[[load]]\nbody = \"ball\"\nkind = \"pressure\"\nvalue = \"120 mmHg\"\nimaged_at = \"80mmHg\"\n";
+  const std::string pulled = "[[load]]\nbody = \"ball\"\nkind = \"area\"\nvalue = [\"0kPa\", \"0kPa\", \"1kPa\"]\n";
+  EXPECT_EQ(stated_line(read(std::string(run) + ball + pressed)),
+            "Pressure 120 mmHg, imaged at 80mmHg, wall 0.1mm, E 1MPa, Poisson's ratio 0.3");
+  const std::string other =
+      "[[shell]]\nname = \"other\"\nmesh = \"ball.ply\"\nthickness = \"0.2mm\"\nyoung = \"1MPa\"\npoisson = 0.3\n";
+  EXPECT_EQ(stated_line(read(std::string(run) + ball + other + pulled)), "Area, E 1MPa, Poisson's ratio 0.3");
+  EXPECT_EQ(stated_line(Scene()), "");
 }
 
 TEST_F(SceneTest, EveryKeyOfADynamicRunArrives) {
@@ -121,6 +134,7 @@ TEST_F(SceneTest, EveryKindOfLoadArrives) {
   EXPECT_DOUBLE_EQ(moment.total.x(), 1000);
   const auto& edge = std::get<EdgeLoad>(loads[2].kind);
   EXPECT_EQ(edge.edges.size(), 4U);
+  EXPECT_THAT(edge.shares, ElementsAre(1, 1, 1, 1));
   EXPECT_DOUBLE_EQ(edge.per_length.z(), 0.002);
   EXPECT_DOUBLE_EQ(std::get<AreaLoad>(loads[3].kind).per_area.y(), 0.001);
   EXPECT_DOUBLE_EQ(std::get<GravityLoad>(loads[4].kind).acceleration.z(), -9810);
@@ -174,11 +188,11 @@ TEST_F(SceneTest, BedsAndSlidesHoldAndLeaveTheRestToRigidMotions) {
     ASSERT_EQ(model.supports.size(), 2U);
     EXPECT_DOUBLE_EQ(model.supports[0].stiffness, 2e-4);
     EXPECT_FALSE(model.supports[0].normal_only);
-    EXPECT_EQ(model.supports[0].nodes.size(), 25U);
+    EXPECT_TRUE(model.supports[0].shares.empty());
     EXPECT_DOUBLE_EQ(model.supports[1].stiffness, 1e-3);
     EXPECT_TRUE(model.supports[1].normal_only);
-    EXPECT_EQ(model.supports[1].nodes.size(), 15U);
-    EXPECT_EQ(std::get<PressureLoad>(model.loads[0].kind).nodes.size(), 15U);
+    EXPECT_EQ(std::ranges::count(model.supports[1].shares, 1.0), 16);
+    EXPECT_EQ(std::get<PressureLoad>(model.loads[0].kind).shares, model.supports[1].shares);
   }
 }
 
