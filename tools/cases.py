@@ -334,7 +334,7 @@ def without_effect(stated, setting_of):
     idle = {"KIND=dynamic": ("DURATION", "STEP")} if setting_of("KIND") == "static" else {"KIND=static": ("LOAD_STEPS",)}
     if by := shells_stated_by(setting_of):
         idle[f"ACCURACY, and {by} is given"] = ("OF",)
-    return [f"{name} is of {of}: leave it out" for of, names in idle.items() for name in names if stated(name)]
+    return [f"{name} has no effect: it belongs to {of}: leave it out" for of, names in idle.items() for name in names if stated(name)]
 
 
 def not_understood(setting_of, called):

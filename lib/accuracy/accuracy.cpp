@@ -64,6 +64,11 @@ std::vector<Region> regions_of(const Model& model) {
       look(load.body, pressure->shares, true);
     }
   }
+  for (const Support& support : model.supports) {
+    if (!support.shares.empty()) {
+      look(support.body, support.shares, true);
+    }
+  }
   for (const Fix& fix : model.fixes) {
     if (fix.body < model.shells.size()) {
       look(fix.body, whole_triangles(model.shells[fix.body].mesh.triangles, fix.nodes), false);
@@ -341,7 +346,7 @@ private:
     }
     if (border_error_ >= request_.within) {
       out_.reasons.push_back(
-          fmt::format("what is pressed or held ends where triangles do, and its area still changes by "
+          fmt::format("what is pressed, held or bedded ends within triangles, and its area still changes by "
                       "{:.2g} %: let its border lie on edges of the mesh",
                       100 * border_error_));
     }

@@ -118,11 +118,24 @@ public:
     to.erase(std::unique(to.begin(), to.end()), to.end());
   }
 
-  void carry(const std::vector<Edge>& from, std::vector<Edge>& to) const {
-    to.clear();
-    for (const auto& [a, b] : from) {
-      const Index middle = between_.at(sorted(a, b));
-      to.insert(to.end(), {{a, middle}, {middle, b}});
+  /// The halves of an edge that is meant as a whole; others where their own place says so.
+  void carry(const EdgeLoad& from, EdgeLoad& to) const {
+    std::map<Edge, double> shares;
+    for (std::size_t i = 0; i < to.edges.size(); ++i) {
+      shares[to.edges[i]] = share_of(to.shares, i);
+    }
+    for (std::size_t i = 0; i < from.edges.size(); ++i) {
+      const auto& [a, b] = from.edges[i];
+      if (share_of(from.shares, i) == 1) {
+        const Index middle = between_.at(sorted(a, b));
+        shares[{a, middle}] = shares[{middle, b}] = 1;
+      }
+    }
+    to.edges.clear();
+    to.shares.clear();
+    for (const auto& [edge, share] : shares) {
+      to.edges.push_back(edge);
+      to.shares.push_back(share);
     }
   }
 
@@ -131,14 +144,6 @@ private:
   std::map<Edge, Index> between_;  // the node that halves an edge
   std::set<Edge> rim_;
 };
-
-/// The quarters of a triangle that lies inside or outside do so, too; those of one that is cut are where they are.
-void carry_shares(const std::vector<double>& from, std::vector<double>& to) {
-  for (std::size_t t = 0; t < to.size(); ++t) {
-    const double share = share_of(from, t / 4);
-    to[t] = share == 0 || share == 1 ? share : to[t];
-  }
-}
 
 }  // namespace
 
@@ -150,26 +155,16 @@ void carry_selections(const Model& coarse, const Level& level, Model& fine) {
   for (std::size_t i = 0; i < coarse.fixes.size(); ++i) {
     carriers[coarse.fixes[i].body].carry(coarse.fixes[i].nodes, fine.fixes[i].nodes);
   }
-  for (std::size_t i = 0; i < coarse.supports.size(); ++i) {
-    carry_shares(coarse.supports[i].shares, fine.supports[i].shares);
-  }
   for (std::size_t i = 0; i < coarse.loads.size(); ++i) {
     const Carrier& carrier = carriers[coarse.loads[i].body];
     const auto& from = coarse.loads[i].kind;
     auto& to = fine.loads[i].kind;
-    if (const auto* pressure = std::get_if<PressureLoad>(&from)) {
-      carry_shares(pressure->shares, std::get<PressureLoad>(to).shares);
-    } else if (const auto* force = std::get_if<ForceLoad>(&from)) {
+    if (const auto* force = std::get_if<ForceLoad>(&from)) {
       carrier.carry(force->nodes, std::get<ForceLoad>(to).nodes);
     } else if (const auto* moment = std::get_if<MomentLoad>(&from)) {
       carrier.carry(moment->nodes, std::get<MomentLoad>(to).nodes);
     } else if (const auto* edge = std::get_if<EdgeLoad>(&from)) {
-      auto& halves = std::get<EdgeLoad>(to);
-      carrier.carry(edge->edges, halves.edges);
-      halves.shares.clear();
-      for (const double share : edge->shares) {
-        halves.shares.insert(halves.shares.end(), 2, share);
-      }
+      carrier.carry(*edge, std::get<EdgeLoad>(to));
     }
   }
 }

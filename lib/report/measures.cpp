@@ -145,7 +145,8 @@ std::vector<Measure> make_geometry() {
           {"distance_percent", "Distance", "%", "The same, in percent of the surface's diagonal.",
            "relax: result.hausdorff_percent.upper; with an accuracy simulate: result.accuracy.hausdorff_percent.upper",
            true, of_shells("hausdorff_percent.upper"), true},
-          {"mean_distance_mm", "Mean distance", "mm", "Mean distance of the curved shells to the surface.",
+          {"mean_distance_mm", "Mean distance", "mm",
+           "Mean distance of the curved shells from the surface and of that from them, the larger of the two.",
            "relax: result.mean_distance_mm; with an accuracy simulate: mean_distance_mm of the last of "
            "result.accuracy.levels",
            false, mean_distance},

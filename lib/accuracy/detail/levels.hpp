@@ -23,7 +23,8 @@ Checkpoint interpolated(const State& state, const std::vector<ShellBody>& coarse
 
 /// Nodes and edges that supports and loads of the coarser model select stay selected, and with two of them the one
 /// between: a refit moves rims out of the planes in which a scene finds them. Not across a corner, where all of a shell
-/// is selected but for the rim: there the place decides, as it does for a single node.
+/// is selected but for the rim: there the place decides, as it does for a single node, for regions of pressures and
+/// beds, and for edges that a region cuts.
 /// @param fine  the model that its own places make; its nodes are added to
 void carry_selections(const Model& coarse, const Level& level, Model& fine);
 

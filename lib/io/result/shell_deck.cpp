@@ -21,6 +21,9 @@ void require_loads(const Model& model, bool linear, Deck deck) {
       refuse(deck, "the file has no moments");
     }
     const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+    if (pressure != nullptr && std::ranges::any_of(pressure->shares, [](double share) { return share < 1; })) {
+      refuse(deck, "the file presses whole bodies, and a pressure acts on a region (where)");
+    }
     if (deck == Deck::inp && pressure != nullptr && !pressure->follower && !linear) {
       refuse(deck, "in a nonlinear step of the file pressure follows the surface (follower = true)");
     }

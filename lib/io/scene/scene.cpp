@@ -4,11 +4,13 @@
 #include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/scene/detail/body_files.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
+#include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 #include <algorithm>
 #include <iterator>
@@ -273,6 +275,48 @@ void warn_of_far_points(const Scene& scene, const Model& model, std::vector<Warn
   }
 }
 
+/// A region that is small beside the shells it lies on: its force is that of the region, its place is theirs.
+void warn_of_small_region(const Model& model, std::size_t body, const std::vector<double>& shares,
+                          const std::string& place, std::vector<Warning>& warnings) {
+  constexpr double small = 0.5;
+  double inside = 0, touched = 0;
+  for (std::size_t t = 0; body < model.shells.size() && t < shares.size(); ++t) {
+    const ShellMesh& mesh = model.shells[body].mesh;
+    const auto& [a, b, c] = mesh.triangles[t];
+    const double area = triangle_area(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]);
+    inside += shares[t] * area;
+    touched += shares[t] > 0 ? area : 0;
+  }
+  if (inside < small * touched) {
+    warnings.push_back({Weight::minor, "small region",
+                        fmt::format("{}: the region is small beside the shells: its force is right, but spread over "
+                                    "shells of {:.2g} times its area; smaller shells there (more of them) place it "
+                                    "better",
+                                    place, touched / inside)});
+  }
+}
+
+/// Carried nodes are free to turn: on one line they are a hinge.
+void warn_of_hinge(const Model& model, const Attachment& attachment, std::vector<Warning>& warnings) {
+  constexpr double straight = 1e-3;
+  if (model.is_solid(attachment.body) || attachment.nodes.size() < 2) {
+    return;
+  }
+  const std::vector<Vec3>& vertices = model.vertices_of(attachment.body);
+  Eigen::Matrix3Xd places(3, attachment.nodes.size());
+  for (std::size_t i = 0; i < attachment.nodes.size(); ++i) {
+    places.col(narrow<Eigen::Index>(i)) = vertices[attachment.nodes[i]];
+  }
+  places.colwise() -= Vec3(places.rowwise().mean());
+  const Vec3 spread = Eigen::JacobiSVD<Eigen::Matrix3Xd>(places).singularValues();
+  if (spread[1] < straight * spread[0]) {
+    warnings.push_back({Weight::major, "hinge",
+                        fmt::format("{}: the nodes that are carried lie on one line, and carried nodes are free to "
+                                    "turn: the joint is a hinge; to clamp it select a strip as wide as a shell or more",
+                                    attachment.said_at)});
+  }
+}
+
 }  // namespace
 
 LoadedScene load_scene(const Scene& scene) {
@@ -292,6 +336,17 @@ LoadedScene load_scene(const Scene& scene) {
   LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings),
                      found.space};
   warn_of_far_points(scene, loaded.model, loaded.warnings);
+  for (const Support& support : loaded.model.supports) {
+    warn_of_small_region(loaded.model, support.body, support.shares, support.said_at, loaded.warnings);
+  }
+  for (const Load& load : loaded.model.loads) {
+    if (const auto* const pressure = std::get_if<PressureLoad>(&load.kind)) {
+      warn_of_small_region(loaded.model, load.body, pressure->shares, load.said_at, loaded.warnings);
+    }
+  }
+  for (const Attachment& attachment : loaded.model.attachments) {
+    warn_of_hinge(loaded.model, attachment, loaded.warnings);
+  }
   std::vector<bool> is_looked_at(loaded.model.shells.size(), false);
   for (const Load& load : loaded.model.loads) {
     const auto* const pressure = std::get_if<PressureLoad>(&load.kind);

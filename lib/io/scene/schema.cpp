@@ -133,7 +133,7 @@ SceneKeys<DynamicRun> dynamic_keys() {
       key("step", &DynamicRun::step, time.in(positive), "dynamic: time step, e.g. 40ms")
           .needed(" (a dynamic run needs it)"),
       key("damping", &DynamicRun::damping, form::inner(dampings, R"({mass = "0.1/s", stiffness = "2ms"})"),
-          "dynamic: in proportion to the masses and to the stiffness"),
+          "dynamic: in proportion to the masses and to the stiffness, of beds not"),
       key("integrator", &DynamicRun::integrator, form::choice<Integrator>(), "dynamic; see Integrators").deciding(),
       key("spectral_radius", &DynamicRun::spectral_radius,
           form::number("0.8").in({0, 1, "{key} {value} is outside [0, 1]: 1 damps nothing, 0 the most", true, true}),

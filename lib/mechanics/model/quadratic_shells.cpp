@@ -113,8 +113,10 @@ private:
         made_.forces[first + node] += factor_ * force->total / real(force->nodes.size());
       }
     } else if (const auto* edges = std::get_if<EdgeLoad>(&load.kind)) {
-      for (const auto& [a, b] : edges->edges) {
-        const Vec3 whole = factor_ * edges->per_length * (made_.nodes[first + b] - made_.nodes[first + a]).norm();
+      for (std::size_t i = 0; i < edges->edges.size(); ++i) {
+        const auto& [a, b] = edges->edges[i];
+        const Vec3 whole = share_of(edges->shares, i) * factor_ * edges->per_length *
+                           (made_.nodes[first + b] - made_.nodes[first + a]).norm();
         made_.forces[first + a] += whole / 6;
         made_.forces[first + b] += whole / 6;
         made_.forces[middles_.at(edge_of(first + a, first + b))] += whole * (2.0 / 3);

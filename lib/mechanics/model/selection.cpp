@@ -3,6 +3,7 @@
 #include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/shell/distance/patch_search.hpp"
+#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
@@ -69,23 +70,27 @@ std::vector<Index> select(const SelectableBody&, const TouchingNodes&, const std
   return {};
 }
 
-std::vector<Index> select(const SelectableBody& body, const BoxNodes& box, const std::string&) {
-  return body.nodes_where([&](const Vec3& p) {
-    return (p.array() >= box.lower.array() - body.tolerance()).all() &&
-           (p.array() <= box.upper.array() + body.tolerance()).all();
-  });
+bool holds(const BoxNodes& box, const Vec3& p, double tolerance) {
+  return (p.array() >= box.lower.array() - tolerance).all() && (p.array() <= box.upper.array() + tolerance).all();
 }
 
-std::vector<Index> select(const SelectableBody& body, const HalfSpaceNodes& half, const std::string&) {
-  return body.nodes_where([&](const Vec3& p) {
-    const double above = p[half.axis] - half.at;
-    return (half.below ? above : -above) <= body.tolerance();
-  });
+bool holds(const HalfSpaceNodes& half, const Vec3& p, double tolerance) {
+  const double above = p[half.axis] - half.at;
+  return (half.below ? above : -above) <= tolerance;
 }
 
-std::vector<Index> select(const SelectableBody& body, const SphereNodes& sphere, const std::string&) {
-  return body.nodes_where(
-      [&](const Vec3& p) { return (p - sphere.centre).norm() <= sphere.radius + body.tolerance(); });
+bool holds(const SphereNodes& sphere, const Vec3& p, double tolerance) {
+  return (p - sphere.centre).norm() <= sphere.radius + tolerance;
+}
+
+template <typename Form>
+inline constexpr bool is_region =
+    std::is_same_v<Form, BoxNodes> || std::is_same_v<Form, HalfSpaceNodes> || std::is_same_v<Form, SphereNodes>;
+
+template <typename Region>
+std::enable_if_t<is_region<Region>, std::vector<Index>> select(const SelectableBody& body, const Region& region,
+                                                               const std::string&) {
+  return body.nodes_where([&](const Vec3& p) { return holds(region, p, body.tolerance()); });
 }
 
 std::vector<Index> select(const SelectableBody& body, const ListedNodes& list, const std::string& said_at) {
@@ -157,6 +162,7 @@ SelectableBody::SelectableBody(const ShellBody& shell)
       edges_(boundary_edges_of(shell.mesh)),
       boundary_(nodes_in(edges_)),
       used_(used_by(shell.mesh.triangles, vertices_.size())) {
+  curved_ = shell.curved ? &shell.mesh : nullptr;
   measure();
 }
 
@@ -298,10 +304,6 @@ double inner_area(const SphereNodes& ball, const std::array<Vec3, 3>& corners) {
   return area;
 }
 
-template <typename Form>
-inline constexpr bool is_region =
-    std::is_same_v<Form, BoxNodes> || std::is_same_v<Form, HalfSpaceNodes> || std::is_same_v<Form, SphereNodes>;
-
 /// What its area or length is measured with.
 inline const SphereNodes& convex(const SphereNodes& ball) { return ball; }
 template <typename Form>
@@ -310,6 +312,56 @@ std::vector<HalfSpace> convex(const Form& form) {
 }
 
 constexpr double hardly_any = 1e-9;  // of a triangle or an edge: rounding
+
+/// Whether some points, and all between them, are certainly outside.
+bool misses(const std::vector<HalfSpace>& region, std::span<const Vec3> points) {
+  return std::ranges::any_of(region, [&](const HalfSpace& half) {
+    return std::ranges::all_of(points, [&](const Vec3& p) { return half.normal.dot(p) > half.offset; });
+  });
+}
+
+bool misses(const SphereNodes& ball, std::span<const Vec3> points) {
+  Vec3 lower = points[0], upper = points[0];
+  for (const Vec3& p : points) {
+    lower = lower.cwiseMin(p);
+    upper = upper.cwiseMax(p);
+  }
+  return (ball.centre.cwiseMax(lower).cwiseMin(upper) - ball.centre).norm() > ball.radius;
+}
+
+/// Of a flat triangle the area that lies in a region.
+template <typename Form>
+double area_within(const Form& form, const std::array<Vec3, 3>& corners, double tolerance) {
+  const bool is_inside = std::ranges::all_of(corners, [&](const Vec3& p) { return holds(form, p, tolerance); });
+  return is_inside ? triangle_area(corners[0], corners[1], corners[2]) : inner_area(convex(form), corners);
+}
+
+/// Of a patch the part of its area that lies in a region, by flat pieces where the border cuts it.
+template <typename Form>
+double share_of_patch(const Form& form, const CubicPatch& patch, double tolerance) {
+  constexpr int pieces = 8;  // per edge: what a patch rises above its facet becomes a 64th
+  if (std::ranges::all_of(patch.control, [&](const Vec3& p) { return holds(form, p, tolerance); })) {
+    return 1;  // regions are convex, and the patch lies between its control points
+  }
+  if (misses(convex(form), patch.control)) {
+    return 0;
+  }
+  const auto point = [&](int i, int j) { return patch.point(Vec2(real(i) / pieces, real(j) / pieces)); };
+  double whole = 0, inside = 0;
+  const auto add = [&](const std::array<Vec3, 3>& corners) {
+    whole += triangle_area(corners[0], corners[1], corners[2]);
+    inside += area_within(form, corners, tolerance);
+  };
+  for (int i = 0; i < pieces; ++i) {
+    for (int j = 0; i + j < pieces; ++j) {
+      add({point(i, j), point(i + 1, j), point(i, j + 1)});
+      if (i + j + 1 < pieces) {
+        add({point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)});
+      }
+    }
+  }
+  return inside / whole;
+}
 
 }  // namespace
 
@@ -327,17 +379,20 @@ std::vector<double> shares_of(const SelectableBody& body, const Selection& where
     return {};
   }
   const std::vector<Index> nodes = std::visit([&](const auto& form) { return select(body, form, said_at); }, where);
-  std::vector<double> shares = whole_triangles(body.triangles(), nodes);  // regions are convex
+  std::vector<double> shares = whole_triangles(body.triangles(), nodes);
+  const std::vector<CubicPatch> patches =
+      body.curved() != nullptr ? curved_patches(*body.curved()) : std::vector<CubicPatch>();
   std::visit(
       [&]<typename Form>(const Form& form) {
         if constexpr (is_region<Form>) {
-          const auto& region = convex(form);
           for (std::size_t t = 0; t < shares.size(); ++t) {
             const auto& [a, b, c] = body.triangles()[t];
             const std::array corners{body.vertices()[a], body.vertices()[b], body.vertices()[c]};
             const double whole = triangle_area(corners[0], corners[1], corners[2]);
-            const double share = shares[t] > 0 || !(whole > 0) ? shares[t] : inner_area(region, corners) / whole;
-            shares[t] = share < hardly_any ? 0 : std::min(share, 1.0);
+            const double share = !patches.empty() ? share_of_patch(form, patches[t], body.tolerance())
+                                 : whole > 0      ? area_within(form, corners, body.tolerance()) / whole
+                                                  : shares[t];
+            shares[t] = share < hardly_any ? 0 : share > 1 - hardly_any ? 1 : share;
           }
         }
       },
@@ -347,7 +402,9 @@ std::vector<double> shares_of(const SelectableBody& body, const Selection& where
       fail_empty(body, said_at, "");
     }
     throw InputError(
-        fmt::format("{}: no triangle has all its nodes among the {} selected: select more", said_at, nodes.size()));
+        fmt::format("{}: nothing of the surface lies in it but {} node(s): no triangle has all its nodes "
+                    "there, or a part of its area: select more",
+                    said_at, nodes.size()));
   }
   return shares;
 }

@@ -47,6 +47,8 @@ public:
   explicit SelectableBody(const SolidBody& solid);
 
   [[nodiscard]] bool solid() const { return solid_; }
+  /// The shells, where their curved patches are the body; else nothing, and the facets are.
+  [[nodiscard]] const ShellMesh* curved() const { return curved_; }
   [[nodiscard]] const std::vector<Vec3>& vertices() const { return vertices_; }
   /// Of its surface.
   [[nodiscard]] const std::vector<std::array<Index, 3>>& triangles() const { return triangles_; }
@@ -69,6 +71,7 @@ private:
 
   const std::vector<Vec3>& vertices_;
   bool solid_;
+  const ShellMesh* curved_ = nullptr;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<std::array<Index, 2>> edges_;
   std::vector<Index> boundary_;
@@ -84,8 +87,9 @@ std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, 
 /// Of each triangle whether all its nodes are among these: 1 or 0.
 std::vector<double> whole_triangles(std::span<const std::array<Index, 3>> triangles, const std::vector<Index>& nodes);
 
-/// Of each triangle of the body's surface the part of its area that lies in a region; where nodes are named, 1 if all
-/// its nodes are. Empty: all of it is meant. Errors: InputError that begins with `said_at`: nothing of it.
+/// Of each triangle of the body's surface, curved where shells are, the part of its area that lies in a region; where
+/// nodes are named, 1 if all its nodes are. Empty: all of it is meant. Errors: InputError that begins with `said_at`:
+/// nothing of it. Cost: 100 ns per triangle, some 10 us where the border of the region cuts a patch.
 std::vector<double> shares_of(const SelectableBody& body, const Selection& where, const std::string& said_at);
 
 /// Boundary edges of a shell, and the part of each that is meant.

@@ -23,14 +23,31 @@
 namespace tunica {
 namespace {
 
-/// The largest pressure on a shell at the end of the load, with its sign, MPa.
-double pressure_on(const Model& model, std::size_t body) {
-  double sum = 0;
+/// The pressure at each node of a shell at the end of the load, with its sign, MPa: the mean of its triangles'.
+std::vector<double> pressures_at(const Model& model, std::size_t body) {
+  const ShellMesh& mesh = model.shells[body].mesh;
+  std::vector<double> sum(mesh.vertices.size(), 0), count(mesh.vertices.size(), 0);
   for (const Load& load : model.loads) {
     const auto* pressure = std::get_if<PressureLoad>(&load.kind);
-    sum += pressure != nullptr && load.body == body ? pressure->value : 0;
+    for (std::size_t t = 0; pressure != nullptr && load.body == body && t < mesh.triangles.size(); ++t) {
+      for (const Index v : mesh.triangles[t]) {
+        sum[v] += share_of(pressure->shares, t) * pressure->value;
+      }
+    }
+  }
+  for (const auto& triangle : mesh.triangles) {
+    for (const Index v : triangle) {
+      ++count[v];
+    }
+  }
+  for (std::size_t v = 0; v < sum.size(); ++v) {
+    sum[v] /= std::max(count[v], 1.0);
   }
   return sum;
+}
+
+bool is_pressed(const std::vector<double>& pressures) {
+  return std::ranges::any_of(pressures, [](double pressure) { return pressure != 0; });
 }
 
 /// Per node of a body: whether a fix, a load at nodes or edges, or another body takes hold of it.
@@ -70,11 +87,13 @@ std::vector<char> touched_nodes(const Model& model, std::size_t body) {
 struct Lumen {
   Vec3 area = Vec3::Zero();  ///< mm^2, normal of the plane that sees most of it, as long as what it sees
   Vec3 centre = Vec3::Zero();
-  double length = 0;  ///< mm
+  double length = 0;    ///< mm
+  double pressure = 0;  ///< MPa, of the wall at the rim
   bool touched = false;
 };
 
-std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& touched) {
+std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& touched,
+                             const std::vector<double>& pressures) {
   std::vector<Lumen> lumens;
   for (const std::vector<Index>& rim : boundary_loops(flat_facets(mesh))) {
     Lumen& lumen = lumens.emplace_back();
@@ -85,6 +104,7 @@ std::vector<Lumen> lumens_of(const ShellMesh& mesh, const std::vector<char>& tou
       lumen.area += a.cross(b) / 2;
       lumen.centre += length * (a + b) / 2;
       lumen.length += length;
+      lumen.pressure += pressures.empty() ? 0 : pressures[rim[i]] / real(rim.size());
       lumen.touched = lumen.touched || (!touched.empty() && touched[rim[i]] != 0);
     }
     lumen.centre /= lumen.length;
@@ -260,17 +280,17 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
   for (std::size_t b = 0; b < model.shells.size(); ++b) {
     const ShellBody& body = model.shells[b];
     doubt_gaps(model, b, found);
-    const double pressure = pressure_on(model, b);
-    if (pressure == 0) {
+    const std::vector<double> pressures = pressures_at(model, b);
+    if (!is_pressed(pressures)) {
       continue;
     }
     doubt_slides(model, b, found);
     std::size_t count = 0;
     const Lumen* widest = nullptr;
-    const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b));
+    const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b), pressures);
     for (const Lumen& lumen : lumens) {
       const double roundness = lumen.area.norm() * 4 * std::numbers::pi / (lumen.length * lumen.length);
-      if (lumen.touched || roundness < least_roundness || is_sheet(body.mesh, lumens)) {
+      if (lumen.touched || lumen.pressure == 0 || roundness < least_roundness || is_sheet(body.mesh, lumens)) {
         continue;
       }
       ++count;
@@ -279,12 +299,13 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
     if (count > 0) {
       found.push_back(
           {Weight::minor, "free end",
-           fmt::format(
-               "{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
-               "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those "
-               "that are cut straight across slide in their planes (--fix rims:slide, FIX=rims:slide)",
-               named(body.said_at, body.name), count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
-               count == 1 ? "" : "the widest ", where(widest->centre), std::abs(pressure) * widest->area.norm())});
+           fmt::format("{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
+                       "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those "
+                       "that are cut straight across slide in their planes (--fix rims:slide, FIX=rims:slide)",
+                       named(body.said_at, body.name),
+                       count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
+                       count == 1 ? "" : "the widest ", where(widest->centre),
+                       std::abs(widest->pressure) * widest->area.norm())});
     }
   }
   return found;
@@ -314,7 +335,7 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
           return std::ranges::any_of(contact.between,
                                      [&](const ContactParty& party) { return !party.rigid && party.index == b; });
         });
-    if (pushed || pressure_on(model, b) == 0 || is_sheet(body.mesh, lumens_of(body.mesh, {}))) {
+    if (pushed || !is_pressed(pressures_at(model, b)) || is_sheet(body.mesh, lumens_of(body.mesh, {}, {}))) {
       continue;
     }
     const double thickness = *std::ranges::max_element(body.thickness);

@@ -323,19 +323,13 @@ TEST(Levels, WhatIsSelectedStaysSelected) {
   single.nodes = {5};
   coarse.fixes = {rim, single};
   Load edge;
-  edge.kind = EdgeLoad{{{2, 3}}, Vec3(0, 0, 1), {0.4}};
-  Load pressure;
-  pressure.kind = PressureLoad{.value = 1, .shares = {0, 0.3, 1, 1}};
-  coarse.loads = {edge, pressure};
+  edge.kind = EdgeLoad{{{2, 3}, {0, 1}}, Vec3(0, 0, 1), {1, 0.4}};
+  coarse.loads = {edge};
   const Level level = finer_level(coarse.shells, {nullptr});
   Model fine = coarse;
   fine.shells = level.bodies;
   fine.fixes[0].nodes = {0};  // what the place finds of the rim after a refit has moved it
   fine.fixes[1].nodes = {4};
-  std::vector<double>& shares = std::get<PressureLoad>(fine.loads[1].kind).shares;
-  shares.assign(16, 0.5);
-  carry_selections(coarse, level, fine);
-  EXPECT_THAT(shares, ::testing::ElementsAre(0, 0, 0, 0, 0.5, 0.5, 0.5, 0.5, 1, 1, 1, 1, 1, 1, 1, 1));
   const auto halved = [&](Index a, Index b) {
     const auto& parents = level.parents.front();
     const auto found = std::find_if(parents.begin(), parents.end(), [&](const auto& pair) {
@@ -343,13 +337,16 @@ TEST(Levels, WhatIsSelectedStaysSelected) {
     });
     return static_cast<Index>(6 + (found - parents.begin()));
   };
+  // Of an edge that a region cuts, its place on the finer level decides.
+  std::get<EdgeLoad>(fine.loads[0].kind) = {{{0, halved(0, 1)}}, Vec3(0, 0, 1), {0.8}};
+  carry_selections(coarse, level, fine);
   EXPECT_THAT(fine.fixes[0].nodes,
               ::testing::UnorderedElementsAre(0, 1, 2, 3, halved(0, 1), halved(1, 2), halved(2, 3)));
   EXPECT_THAT(fine.fixes[1].nodes, ::testing::ElementsAre(4));
   const Index middle = halved(2, 3);
-  const std::vector<std::array<Index, 2>> halves{{2, middle}, {middle, 3}};
+  const std::vector<std::array<Index, 2>> halves{{0, halved(0, 1)}, {2, middle}, {middle, 3}};
   EXPECT_EQ(std::get<EdgeLoad>(fine.loads[0].kind).edges, halves);
-  EXPECT_THAT(std::get<EdgeLoad>(fine.loads[0].kind).shares, ::testing::ElementsAre(0.4, 0.4));
+  EXPECT_THAT(std::get<EdgeLoad>(fine.loads[0].kind).shares, ::testing::ElementsAre(0.8, 1, 1));
 }
 
 /// A sphere under a pressure that grows over `ramp` seconds; it breathes with a period that is known.

@@ -4,6 +4,7 @@
 #include "tunica/mechanics/runs/meeting_walls.hpp"
 
 #include "benchmarks.hpp"
+#include "tunica/mechanics/model/selection.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 
 #include <gmock/gmock.h>
@@ -64,6 +65,22 @@ TEST(HoldDoubts, FreeEndsLackTheirThrust) {
   model.fixes.clear();
   model.loads.clear();
   EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+}
+
+TEST(HoldDoubts, AnEndWhereNoPressureActsLacksNothing) {
+  Model model = tube(10, 40, 1, 0.01);
+  auto& pressure = std::get<PressureLoad>(model.loads[0].kind);
+  const SelectableBody body(model.shells[0]);
+  pressure.shares = shares_of(body, BoxNodes{Vec3(-20, -20, 10), Vec3(20, 20, 30)}, "here");
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+  // In two parts it is the same pressure.
+  pressure.shares = shares_of(body, HalfSpaceNodes{2, 17, true}, "here");
+  Load other = model.loads[0];
+  std::get<PressureLoad>(other.kind).shares = shares_of(body, HalfSpaceNodes{2, 17, false}, "here");
+  model.loads.push_back(other);
+  const std::vector<Warning> found = doubts_of_ends(model);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("3.11 N"));
 }
 
 TEST(HoldDoubts, ASheetHasNoLumen) {

@@ -373,11 +373,11 @@ class Rules(WithStubs):
         self.assertIn("VOLUMES not given", self.refusal(VOLUMES="", LABEL=1, **LOAD))
         self.assertIn("OUT: has no name", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "OUT": ""}))
         self.assertIn("folder", self.refusal(VOLUMES="a.nii.gz", LABELS="../1", **LOAD))
-        for given, words in (({"DURATION": "1s"}, "DURATION is of KIND=dynamic: leave it out"),
-                             ({"SHELLS": "800", "OF": "stress"}, "OF is of ACCURACY, and SHELLS is given: leave it out"),
-                             ({"SIMULATE": "--accuracy 2%", "OF": "stress"}, "OF is of ACCURACY, and SIMULATE=--accuracy is given"),
+        for given, words in (({"DURATION": "1s"}, "DURATION has no effect: it belongs to KIND=dynamic: leave it out"),
+                             ({"SHELLS": "800", "OF": "stress"}, "OF has no effect: it belongs to ACCURACY, and SHELLS is given: leave it out"),
+                             ({"SIMULATE": "--accuracy 2%", "OF": "stress"}, "OF has no effect: it belongs to ACCURACY, and SIMULATE=--accuracy is given"),
                              ({"KIND": "dynamic", "DENSITY": "1g/cm3", "DURATION": "1s", "STEP": "1ms", "LOAD_STEPS": "3"},
-                              "LOAD_STEPS is of KIND=static: leave it out")):
+                              "LOAD_STEPS has no effect: it belongs to KIND=static: leave it out")):
             self.assertIn(words, self.refusal(VOLUMES="a.nii.gz", LABEL=1, **given, **LOAD))
         (self.bin / "tunica-relax").unlink()
         self.assertIn("no tunica-relax", self.refusal(VOLUMES="a.nii.gz", LABEL=1, **LOAD))

@@ -36,6 +36,69 @@ class Doubtful(SimulateTest):
         for young in ("1kPa", "100MPa", "2GPa"):
             self.assertEqual(told(young=young, density="1.05g/cm3", pressure="0.1Pa"), [])
 
+    def test_regions_smaller_than_the_shells(self):
+        for radius, small in (("0.5mm", True), ("5mm", False)):
+            write_ply(self.path("plate.ply"), *grid(8, 8, 20, 20))
+            self.write("small.toml", f"""
+[run]
+kind = "static"
+[[shell]]
+name = "plate"
+mesh = "plate.ply"
+young = "1MPa"
+poisson = 0.3
+thickness = "1mm"
+[[fix]]
+body = "plate"
+where = {{boundary = true}}
+translation = "xyz"
+rotation = "xyz"
+[[load]]
+body = "plate"
+kind = "pressure"
+value = "1Pa"
+where = {{sphere = {{centre = ["9mm", "11mm", "0mm"], radius = "{radius}"}}}}
+""")
+            self.assertEqual("the region is small beside the shells" in " ".join(self.warned("--scene", "small.toml")), small)
+
+    def test_strips_that_are_joined_along_a_line_have_a_hinge(self):
+        for first, hinged in ((20, True), (18, False)):
+            vertices, triangles = grid(10, 4, 20, 8)
+            write_ply(self.path("one.ply"), vertices, triangles)
+            write_ply(self.path("two.ply"), vertices + np.array([first, 0, 0]), triangles)
+            strips = "".join(f"""
+[[shell]]
+name = "{name}"
+mesh = "{name}.ply"
+young = "1GPa"
+poisson = 0.3
+thickness = "1mm"
+""" for name in ("one", "two"))
+            self.write("strips.toml", f"""
+[run]
+kind = "static"
+{strips}
+[[fix]]
+body = "one"
+where = {{below = {{axis = "x", at = "0mm"}}}}
+translation = "xyz"
+rotation = "xyz"
+[[fix]]
+body = "two"
+where = {{above = {{axis = "x", at = "{first + 20}mm"}}}}
+translation = "z"
+rotation = ""
+[[attach]]
+body = "two"
+where = {{below = {{axis = "x", at = "20mm"}}}}
+to = "one"
+[[load]]
+body = "two"
+kind = "pressure"
+value = "1Pa"
+""")
+            self.assertEqual("the joint is a hinge" in " ".join(self.warned("--scene", "strips.toml")), hinged)
+
     def test_a_wall_without_an_inner_face(self):
         self.assertIn("is more than the radius of curvature", self.warned("ball.ply", *words(thickness="12mm"), *HELD)[0])
         self.run_tool("ball.ply", "out.hdf", *words(thickness="21mm"), *HELD, "--force", code=3,
