@@ -44,7 +44,7 @@ struct Region {
   double acting = 0;  ///< of the area, what acts: of a load that part, of a fix the rest
 };
 
-/// Those of loads and fixes that name nodes, in their order.
+/// Those of pressures, beds and fixes, in their order.
 std::vector<Region> regions_of(const Model& model) {
   std::vector<Region> regions;
   const auto look = [&](std::size_t body, const std::vector<double>& shares, bool is_load) {

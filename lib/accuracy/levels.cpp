@@ -122,7 +122,10 @@ public:
   void carry(const EdgeLoad& from, EdgeLoad& to) const {
     std::map<Edge, double> shares;
     for (std::size_t i = 0; i < to.edges.size(); ++i) {
-      shares[to.edges[i]] = share_of(to.shares, i);
+      const auto& [a, b] = to.edges[i];
+      if (std::max(a, b) >= coarse_.vertices.size()) {  // a half, no edge that the finer level has no more
+        shares[to.edges[i]] = share_of(to.shares, i);
+      }
     }
     for (std::size_t i = 0; i < from.edges.size(); ++i) {
       const auto& [a, b] = from.edges[i];

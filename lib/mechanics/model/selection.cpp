@@ -12,6 +12,7 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <concepts>
 #include <map>
 #include <set>
 
@@ -84,12 +85,10 @@ bool holds(const SphereNodes& sphere, const Vec3& p, double tolerance) {
 }
 
 template <typename Form>
-inline constexpr bool is_region =
-    std::is_same_v<Form, BoxNodes> || std::is_same_v<Form, HalfSpaceNodes> || std::is_same_v<Form, SphereNodes>;
+concept Region = std::same_as<Form, BoxNodes> || std::same_as<Form, HalfSpaceNodes> || std::same_as<Form, SphereNodes>;
 
-template <typename Region>
-std::enable_if_t<is_region<Region>, std::vector<Index>> select(const SelectableBody& body, const Region& region,
-                                                               const std::string&) {
+template <Region Form>
+std::vector<Index> select(const SelectableBody& body, const Form& region, const std::string&) {
   return body.nodes_where([&](const Vec3& p) { return holds(region, p, body.tolerance()); });
 }
 
@@ -208,13 +207,16 @@ std::vector<Index> nodes_of(const SelectableBody& body, const Selection& where, 
 
 namespace {
 
+constexpr double hardly_any = 1e-9;  // of a triangle or an edge: rounding
+
 /// Half of space: normal * x <= offset.
 struct HalfSpace {
   Vec3 normal;
   double offset;
 };
 
-std::vector<HalfSpace> half_spaces(const BoxNodes& box) {
+/// The region that a form stands for, as its areas and lengths are measured.
+std::vector<HalfSpace> convex(const BoxNodes& box) {
   std::vector<HalfSpace> all;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     all.push_back({Vec3::Unit(axis), box.upper[axis]});
@@ -223,10 +225,12 @@ std::vector<HalfSpace> half_spaces(const BoxNodes& box) {
   return all;
 }
 
-std::vector<HalfSpace> half_spaces(const HalfSpaceNodes& half) {
+std::vector<HalfSpace> convex(const HalfSpaceNodes& half) {
   const double sign = half.below ? 1 : -1;
   return {{sign * Vec3::Unit(half.axis), sign * half.at}};
 }
+
+const SphereNodes& convex(const SphereNodes& ball) { return ball; }
 
 /// Where a segment enters and leaves a region, as parts of the way; 0, 0: nowhere.
 std::pair<double, double> inner_part(const std::vector<HalfSpace>& region, const Vec3& from, const Vec3& to) {
@@ -245,18 +249,13 @@ std::pair<double, double> inner_part(const std::vector<HalfSpace>& region, const
   return enters < leaves ? std::pair(enters, leaves) : std::pair(0.0, 0.0);
 }
 
-/// A line from p along d and the sphere |x| = radius.
-template <typename Vector>
-std::pair<double, double> inner_part(double radius, const Vector& p, const Vector& d) {
-  const double a = d.squaredNorm(), b = p.dot(d), root = b * b - a * (p.squaredNorm() - radius * radius);
+std::pair<double, double> inner_part(const SphereNodes& ball, const Vec3& from, const Vec3& to) {
+  const Vec3 p = from - ball.centre, d = to - from;
+  const double a = d.squaredNorm(), b = p.dot(d), root = b * b - a * (p.squaredNorm() - ball.radius * ball.radius);
   if (!(root > 0) || !(a > 0)) {
     return {0, 0};
   }
   return {std::clamp((-b - std::sqrt(root)) / a, 0.0, 1.0), std::clamp((-b + std::sqrt(root)) / a, 0.0, 1.0)};
-}
-
-std::pair<double, double> inner_part(const SphereNodes& ball, const Vec3& from, const Vec3& to) {
-  return inner_part<Vec3>(ball.radius, from - ball.centre, to - from);
 }
 
 /// Source: Sutherland, Hodgman, "Reentrant polygon clipping", CACM 17, 1974.
@@ -291,27 +290,18 @@ double inner_area(const SphereNodes& ball, const std::array<Vec3, 3>& corners) {
   if (!(squared > 0)) {
     return 0;
   }
-  const Vec3 centre = ball.centre + height * normal;
+  const SphereNodes disc{ball.centre + height * normal, std::sqrt(squared)};
   const auto twice = [&](const Vec3& p, const Vec3& q) { return normal.dot(p.cross(q)); };
   const auto sector = [&](const Vec3& p, const Vec3& q) { return squared * std::atan2(twice(p, q), p.dot(q)); };
   double area = 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3 p = corners[k] - centre, q = corners[(k + 1) % 3] - centre;
-    const auto [enters, leaves] = inner_part<Vec3>(std::sqrt(squared), p, q - p);
+    const Vec3 p = corners[k] - disc.centre, q = corners[(k + 1) % 3] - disc.centre;
+    const auto [enters, leaves] = inner_part(disc, corners[k], corners[(k + 1) % 3]);
     const Vec3 in = p + enters * (q - p), out = p + leaves * (q - p);
     area += (sector(p, in) + twice(in, out) + sector(out, q)) / 2;
   }
   return area;
 }
-
-/// What its area or length is measured with.
-inline const SphereNodes& convex(const SphereNodes& ball) { return ball; }
-template <typename Form>
-std::vector<HalfSpace> convex(const Form& form) {
-  return half_spaces(form);
-}
-
-constexpr double hardly_any = 1e-9;  // of a triangle or an edge: rounding
 
 /// Whether some points, and all between them, are certainly outside.
 bool misses(const std::vector<HalfSpace>& region, std::span<const Vec3> points) {
@@ -384,7 +374,7 @@ std::vector<double> shares_of(const SelectableBody& body, const Selection& where
       body.curved() != nullptr ? curved_patches(*body.curved()) : std::vector<CubicPatch>();
   std::visit(
       [&]<typename Form>(const Form& form) {
-        if constexpr (is_region<Form>) {
+        if constexpr (Region<Form>) {
           for (std::size_t t = 0; t < shares.size(); ++t) {
             const auto& [a, b, c] = body.triangles()[t];
             const std::array corners{body.vertices()[a], body.vertices()[b], body.vertices()[c]};
@@ -417,7 +407,7 @@ SelectedEdges edges_of(const SelectableBody& body, const Selection& where, const
     double share = chosen.contains(edge[0]) && chosen.contains(edge[1]) ? 1 : 0;
     std::visit(
         [&]<typename Form>(const Form& form) {
-          if constexpr (is_region<Form>) {
+          if constexpr (Region<Form>) {
             const auto [enters, leaves] = inner_part(convex(form), body.vertices()[edge[0]], body.vertices()[edge[1]]);
             share = share > 0 ? share : leaves - enters;
           }

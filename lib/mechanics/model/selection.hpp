@@ -5,7 +5,8 @@
 
 #include <span>
 
-/// Where on a body something is held, loaded or carried, and which of its nodes these are.
+/// Where on a body something is held, loaded or carried: which of its nodes these are, what part of its triangles and
+/// edges.
 namespace tunica {
 
 /// Regions include what lies on their border, to `region_tolerance` of the body's bounding-box diagonal, so that

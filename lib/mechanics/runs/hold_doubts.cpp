@@ -285,12 +285,15 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
       continue;
     }
     doubt_slides(model, b, found);
+    const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b), pressures);
+    if (is_sheet(body.mesh, lumens)) {
+      continue;
+    }
     std::size_t count = 0;
     const Lumen* widest = nullptr;
-    const std::vector<Lumen> lumens = lumens_of(body.mesh, touched_nodes(model, b), pressures);
     for (const Lumen& lumen : lumens) {
       const double roundness = lumen.area.norm() * 4 * std::numbers::pi / (lumen.length * lumen.length);
-      if (lumen.touched || lumen.pressure == 0 || roundness < least_roundness || is_sheet(body.mesh, lumens)) {
+      if (lumen.touched || lumen.pressure == 0 || roundness < least_roundness) {
         continue;
       }
       ++count;

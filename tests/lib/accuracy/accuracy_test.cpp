@@ -338,7 +338,8 @@ TEST(Levels, WhatIsSelectedStaysSelected) {
     return static_cast<Index>(6 + (found - parents.begin()));
   };
   // Of an edge that a region cuts, its place on the finer level decides.
-  std::get<EdgeLoad>(fine.loads[0].kind) = {{{0, halved(0, 1)}}, Vec3(0, 0, 1), {0.8}};
+  // What is no edge there any more is dropped.
+  std::get<EdgeLoad>(fine.loads[0].kind) = {{{0, halved(0, 1)}, {2, 3}}, Vec3(0, 0, 1), {0.8, 1}};
   carry_selections(coarse, level, fine);
   EXPECT_THAT(fine.fixes[0].nodes,
               ::testing::UnorderedElementsAre(0, 1, 2, 3, halved(0, 1), halved(1, 2), halved(2, 3)));

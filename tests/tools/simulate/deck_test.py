@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ElementTree
 import h5py
 import numpy as np
 
+from published import fix, load, run_lines, shell
 from support import SimulateTest, grid, sphere, write_ply
 
 CALCULIX = shutil.which("ccx")
@@ -126,6 +127,21 @@ value = "10kPa"
         self.assertEqual(len(rows_of(blocks, "BOUNDARY")), 6)
         self.assertIn("NLGEOM", next(parameters for keyword, parameters, _ in blocks if keyword == "STEP"))
         self.check_feb(nodes, elements[:, 1:], normals, thickness)
+
+    def test_what_acts_on_a_part(self):
+        vertices, triangles = grid(4, 4, 10, 10)
+        write_ply(self.path("plate.ply"), vertices, triangles)
+        plate = run_lines(kind="static") + shell("plate.ply", 1, 100, 0.3) + fix(np.flatnonzero(vertices[:, 0] < 0.1))
+        for deck in ("inp", "feb"):
+            self.write("part.toml", plate + load("pressure", "1Pa", more='where = {above = {axis = "x", at = "3mm"}}\n'))
+            self.run_tool("--scene", "part.toml", "out.hdf", "--export", deck, code=2,
+                          says=[f"--export {deck}: the file presses whole bodies", "leave it out"])
+            self.assertEqual([name for name in os.listdir(self.folder) if name.startswith("out")], [])
+        self.write("edge.toml", plate + load("edge", [0.0, 0.0, 1e-3], "N/mm",
+                   more='where = {box = [["9mm", "1mm", "-1mm"], ["11mm", "9mm", "1mm"]]}\n'))
+        self.run_tool("--scene", "edge.toml", "out.hdf", "--export", "inp")
+        total = sum(float(row[2]) for row in rows_of(read_inp(self.path("out.inp"))[0], "CLOAD") if row[1] == "3")
+        self.assertAlmostEqual(total, 8e-3, places=9)
 
     def check_feb(self, middle, elements, normals, thickness):
         """The structure that FEBio's manual gives, its references, and the same model."""

@@ -3,6 +3,7 @@
 import unittest
 
 import numpy as np
+from published import fix, load, run_lines, shell
 from support import SimulateTest, grid, sphere, write_ply
 
 HELD = ["--fix", "rigid-motions", "--static"]
@@ -37,66 +38,25 @@ class Doubtful(SimulateTest):
             self.assertEqual(told(young=young, density="1.05g/cm3", pressure="0.1Pa"), [])
 
     def test_regions_smaller_than_the_shells(self):
+        vertices, triangles = grid(8, 8, 20, 20)
+        write_ply(self.path("plate.ply"), vertices, triangles)
+        rim = np.flatnonzero(np.abs(vertices[:, :2] - 10).max(axis=1) > 9.9)
         for radius, small in (("0.5mm", True), ("5mm", False)):
-            write_ply(self.path("plate.ply"), *grid(8, 8, 20, 20))
-            self.write("small.toml", f"""
-[run]
-kind = "static"
-[[shell]]
-name = "plate"
-mesh = "plate.ply"
-young = "1MPa"
-poisson = 0.3
-thickness = "1mm"
-[[fix]]
-body = "plate"
-where = {{boundary = true}}
-translation = "xyz"
-rotation = "xyz"
-[[load]]
-body = "plate"
-kind = "pressure"
-value = "1Pa"
-where = {{sphere = {{centre = ["9mm", "11mm", "0mm"], radius = "{radius}"}}}}
-""")
+            where = f'where = {{sphere = {{centre = ["9mm", "11mm", "0mm"], radius = "{radius}"}}}}\n'
+            self.write("small.toml", run_lines(kind="static") + shell("plate.ply", 1, 1, 0.3) + fix(rim) +
+                       load("pressure", "1Pa", more=where))
             self.assertEqual("the region is small beside the shells" in " ".join(self.warned("--scene", "small.toml")), small)
 
     def test_strips_that_are_joined_along_a_line_have_a_hinge(self):
+        vertices, triangles = grid(10, 4, 20, 8)
+        write_ply(self.path("one.ply"), vertices, triangles)
         for first, hinged in ((20, True), (18, False)):
-            vertices, triangles = grid(10, 4, 20, 8)
-            write_ply(self.path("one.ply"), vertices, triangles)
             write_ply(self.path("two.ply"), vertices + np.array([first, 0, 0]), triangles)
-            strips = "".join(f"""
-[[shell]]
-name = "{name}"
-mesh = "{name}.ply"
-young = "1GPa"
-poisson = 0.3
-thickness = "1mm"
-""" for name in ("one", "two"))
-            self.write("strips.toml", f"""
-[run]
-kind = "static"
-{strips}
-[[fix]]
-body = "one"
-where = {{below = {{axis = "x", at = "0mm"}}}}
-translation = "xyz"
-rotation = "xyz"
-[[fix]]
-body = "two"
-where = {{above = {{axis = "x", at = "{first + 20}mm"}}}}
-translation = "z"
-rotation = ""
-[[attach]]
-body = "two"
-where = {{below = {{axis = "x", at = "20mm"}}}}
-to = "one"
-[[load]]
-body = "two"
-kind = "pressure"
-value = "1Pa"
-""")
+            other = "".join(part.replace('"s"', '"t"') for part in (
+                shell("two.ply", 1, 1000, 0.3), fix(np.flatnonzero(vertices[:, 0] > 19.9), "z", ""), load("pressure", "1Pa")))
+            self.write("strips.toml", run_lines(kind="static") + shell("one.ply", 1, 1000, 0.3) +
+                       fix(np.flatnonzero(vertices[:, 0] < 0.1)) + other +
+                       '[[attach]]\nbody = "t"\nwhere = {below = {axis = "x", at = "20mm"}}\nto = "s"\n')
             self.assertEqual("the joint is a hinge" in " ".join(self.warned("--scene", "strips.toml")), hinged)
 
     def test_a_wall_without_an_inner_face(self):

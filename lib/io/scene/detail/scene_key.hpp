@@ -37,14 +37,13 @@ struct SceneKey {
   std::shared_ptr<const KeyAccess<Item>> access{};
   bool is_needed = false;
   bool has_default = true;
-  bool decides = false;        ///< which others belong to the item: it is read before them
-  std::string_view why{};      ///< it is needed, for the message that it is missing
-  std::string_view instead{};  ///< a key that makes this one needless
-  std::string_view against{};  ///< a key beside which this one cannot be
-  // Beside what the access says of these.
-  std::function<std::string(const Item&)> reason{};
-  std::function<bool(const Item&)> condition{};
-  std::function<void(Item&)> more{};
+  bool decides = false;                              ///< which others belong to the item: it is read before them
+  std::string_view why{};                            ///< it is needed, for the message that it is missing
+  std::string_view instead{};                        ///< a key that makes this one needless
+  std::string_view against{};                        ///< a key beside which this one cannot be
+  std::function<std::string(const Item&)> reason{};  ///< where given, in place of the access's refuses()
+  std::function<bool(const Item&)> condition{};      ///< likewise of its is_written()
+  std::function<void(Item&)> more{};                 ///< done to the item once the key was read
 
   void read(const SceneTable& table, const toml::node& node, Item& item) const {
     access->read(table, node, item);
