@@ -171,8 +171,10 @@ private:
   [[nodiscard]] Answer solve_for_answer(const RunSettings& settings) const {
     Answer answer = solved(settings);
     if (!(std::abs(answer.value) > 0)) {
-      throw InputError(fmt::format("{}: the quantity asked for is zero: no part of it can be kept within",
-                                   model_.shells.front().name));
+      throw InputError(
+          fmt::format("{}: the answer is zero here, so that its error in percent means nothing: ask for the accuracy "
+                      "of another one (--of)",
+                      model_.shells.front().name));
     }
     return answer;
   }
@@ -345,10 +347,10 @@ private:
       }
     }
     if (border_error_ >= request_.within) {
-      out_.reasons.push_back(
-          fmt::format("what is pressed, held or bedded ends within triangles, and its area still changes by "
-                      "{:.2g} %: let its border lie on edges of the mesh",
-                      100 * border_error_));
+      out_.reasons.push_back(fmt::format(
+          "the region of a load, hold or bed ends within triangles, and its area still changes by {:.2g} % from "
+          "level to level: let its border lie on edges of the mesh",
+          100 * border_error_));
     }
     const double thinnest = least_thickness(last_->system.model());
     doubt_distance(out_.levels.back().mean_distance.value_or(0), thinnest);
@@ -358,14 +360,15 @@ private:
     if (other_state_ >= model_share * request_.within) {
       out_.reasons.push_back(
           fmt::format("there are several states of rest, {} apart: which one the shell comes to "
-                      "depends on what no mesh knows",
+                      "depends on how the load got there",
                       percent_text(other_state_)));
     }
     if (const std::size_t bent = count_unresolved(last_->system.model(), last_->at, largest_bend); bent > 0) {
       out_.reasons.push_back(fmt::format("{} shell(s) bend by more than 30 degrees", bent));
     }
     if (last_->summary.stiffened_from) {
-      out_.reasons.emplace_back("waves as short as the shells were made stiff: the mesh is coarse for so thin a wall");
+      out_.reasons.emplace_back(
+          "the shells are coarse for so thin a wall: where they would have buckled edge by edge they were stiffened");
     }
     if (!last_->summary.snaps.empty()) {
       out_.reasons.emplace_back("the shell snaps through on its way: where it rests then may depend on the mesh");

@@ -140,7 +140,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
                            const std::function<Answer(const RunSettings&)>& solve_for_answer) {
   const auto& given = std::get<DynamicRun>(settings.kind);
   const double left_by_order = given.integrator == Integrator::backward_euler ? 0.5 : 0.25;
-  std::vector<RunSettings> tried;
+  std::vector<RunSettings> runs;
   std::vector<double> values, seconds;
   const auto off = [&](double value) { return std::abs(value / values.back() - 1); };
   double left = infinity;
@@ -148,9 +148,9 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   const auto error_of = [&](std::size_t run) { return (run + 1 < values.size() ? off(values[run]) : 0) + left; };
   for (;;) {
     RunSettings finer = settings;
-    std::get<DynamicRun>(finer.kind).step = std::ldexp(given.step, -narrow<int>(tried.size()));
+    std::get<DynamicRun>(finer.kind).step = std::ldexp(given.step, -narrow<int>(runs.size()));
     const Answer answer = solve_for_answer(finer);
-    tried.push_back(finer);
+    runs.push_back(finer);
     values.push_back(answer.value);
     seconds.push_back(answer.seconds);
     const std::size_t n = values.size();
@@ -166,9 +166,9 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
     }
   }
   const auto milliseconds = [&](std::size_t run) {
-    return fmt::format("{:.4g} ms", 1e3 * std::get<DynamicRun>(tried[run].kind).step);
+    return fmt::format("{:.4g} ms", 1e3 * std::get<DynamicRun>(runs[run].kind).step);
   };
-  MotionChoice choice{tried[chosen], error_of(chosen), {}};
+  MotionChoice choice{runs[chosen], error_of(chosen), {}};
   const std::size_t other = chosen > 0 ? chosen - 1 : 1;
   choice.choices.push_back({"step", milliseconds(chosen), choice.error, milliseconds(other),
                             chosen > 0 ? fmt::format("an error of {}", percent_text(error_of(other)))

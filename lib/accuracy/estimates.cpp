@@ -39,6 +39,9 @@ constexpr std::array percentiles{
 /// The value at one place, which moves from mesh to mesh: two of them may be alike by chance.
 constexpr std::array<std::string_view, 3> maxima{"membrane_max_mpa", "stress_max_mpa", "strain_max_percent"};
 
+// A largest stress or strain moves from mesh to mesh.
+bool is_at_one_place(const std::string& name) { return std::ranges::find(maxima, name) != maxima.end(); }
+
 }  // namespace
 
 Answers answers_of(const State& state, const ElementFields& fields) {
@@ -83,9 +86,10 @@ Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool 
     for (const Answers& level : levels) {
       values.push_back(level[i].second);
     }
+    const auto& name = levels.back()[i].first;
     const double error = error_of_last(values) + (values.back() == 0 ? 0 : besides);
-    estimates[levels.back()[i].first] = {error, !doubtful && levels.size() > 2 && error < largest_credible,
-                                         fmt::format("{} levels", levels.size())};
+    estimates[name] = {error, !doubtful && levels.size() > 2 && error < largest_credible && !is_at_one_place(name),
+                       fmt::format("{} levels", levels.size())};
   }
   return estimates;
 }
@@ -124,8 +128,7 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
     RefinedAnswers refined;
     for (const auto& [name, change] : changes) {
       const double error = error_of_coarse * change;
-      const bool is_maximum = std::ranges::find(maxima, name) != maxima.end();
-      refined.estimates[name] = {error, error < largest_credible && !is_maximum,
+      refined.estimates[name] = {error, error < largest_credible && !is_at_one_place(name),
                                  fmt::format("one refinement to {} shells", level.shell_count())};
     }
     return refined;

@@ -83,8 +83,8 @@ void LabelTables::read(const std::filesystem::path& volume, const std::optional<
   }
   for (const std::filesystem::path& table : label_tables_beside(volume)) {
     try {
-      beside_ = read_label_names(table);
       context.reads(table);
+      beside_ = read_label_names(table);
       if (const auto several = several_names(table, beside_)) {
         context.warn(*several);
       }

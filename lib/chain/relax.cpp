@@ -68,7 +68,7 @@ void turn_outward(const fs::path& path, TriangleMesh& mesh, const Context& conte
     context.warn(
         {Weight::minor, "faces inward",
          fmt::format("{}: {} of its {} pieces lie within others: they are taken for the walls of hollows, and are "
-                     "turned around to face into them; a surface of its own is to be a mesh of its own",
+                     "turned around to face into them; where one is another organ, put it into a file of its own",
                      path.string(), facing.inward, facing.pieces)});
   } else {
     context.warn(

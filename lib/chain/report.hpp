@@ -8,7 +8,7 @@
 
 #include <optional>
 
-/// What reports say of each stage, key by key (`result` in docs/command-line.md and docs/results.md).
+/// What reports say of each stage, key by key (docs/report-keys.md).
 namespace tunica::chain {
 
 /// @param surface  none: every key, without a value

@@ -273,7 +273,7 @@ std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& me
   return target;
 }
 
-void read_targets(SimulateSettings& settings, LoadedRun& loaded, const Context& context) {
+void read_targets(const SimulateSettings& settings, LoadedRun& loaded, const Context& context) {
   const Scene& scene = settings.scene;
   loaded.targets.resize(scene.shells.size());
   std::map<std::string, fs::path> paths;
@@ -285,14 +285,14 @@ void read_targets(SimulateSettings& settings, LoadedRun& loaded, const Context& 
   for (const auto& [name, path] : paths) {
     const auto found = std::ranges::find(scene.shells, name, &SceneShell::name);
     const std::size_t b = found - scene.shells.begin();
-    settings.inputs.push_back(path);
+    loaded.inputs.push_back(path);
     context.reads(path);
     loaded.targets[b] =
         read_target(*found, loaded.model.shells[b].mesh, path, scene.accuracy.has_value(), loaded, context);
   }
 }
 
-/// Goes from level to level. @return the system of the last one
+/// Goes from level to level; the settings become those of the last one. @return its system
 System choose_model(SimulateSettings& settings, const LoadedRun& loaded, const Model& model, RunRecord& record,
                     const Context& context) {
   Scene& scene = settings.scene;
@@ -481,8 +481,8 @@ void require_accuracy(const Accuracy& accuracy, const SimulateSettings& settings
   }
   context.warn(
       {Weight::minor, "accuracy not reached",
-       fmt::format("{}: {}; shells made anew of this surface, four times as many (of the pipeline SHELLS={} in "
-                   "place of ACCURACY, OF and --max-seconds), may do better, as far as the surface has them",
+       fmt::format("{}: {}. Fit four times as many shells to the surface, as far as it has them (tunica-relax; in the "
+                   "pipeline SHELLS={} in place of ACCURACY, OF and --max-seconds)",
                    subject, missed_accuracy(accuracy), 4 * accuracy.levels.back().shells)});
 }
 
@@ -509,15 +509,16 @@ void tell_modes(const Summary& summary, const RunSettings& run, const fs::path& 
 
 /// The answer in a line.
 std::string answer_text(const LastState& last, bool with_wall) {
-  std::string text = fmt::format("largest displacement {:.4g} mm", last.largest_displacement);
+  const bool rests = last.largest_displacement == 0 && !last.peak;
+  std::string text = rests ? "nothing moves" : fmt::format("largest displacement {:.4g} mm", last.largest_displacement);
   if (last.peak) {
     text += fmt::format(" at the end of the motion ({:.4g} mm at most in the states written, at {:.4g} s)",
                         last.peak->displacement, last.peak->time);
   }
   if (with_wall) {
-    text += fmt::format(
-        " (99 % of the wall below {:.4g} mm), membrane stress of the wall {} (99th percentile), at its faces {}",
-        last.displacement_p99, pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99));
+    text += rests ? "" : fmt::format(" (99 % of the wall below {:.4g} mm)", last.displacement_p99);
+    text += fmt::format(", membrane stress of the wall {} (99th percentile), at its faces {}",
+                        pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99));
   }
   return text;
 }
@@ -526,9 +527,9 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
           const Context& context) {
   const fs::path& subject = settings.inputs.front();
   const LastState last = record.last.value_or(LastState());
-  context.note(fmt::format("{} nodes in {} steps, {}: {}", model.node_count(), record.summary->steps,
-                           record.converged ? "converged" : "not asked to converge",
-                           answer_text(last, !model.shells.empty())));
+  context.note(fmt::format(
+      "{} nodes in {} step{}, {}: {}", model.node_count(), record.summary->steps, record.summary->steps == 1 ? "" : "s",
+      record.converged ? "converged" : "not asked to converge", answer_text(last, !model.shells.empty())));
   Summary without = *record.summary;
   if (record.accuracy) {
     without.linear_departure.reset();  // a linear model was held against a nonlinear one
@@ -536,13 +537,10 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
   warn_of(subject, run_warnings(settings.scene.run, without, last), context);
   constexpr double notable = 0.02;
   if (const double open = open_at_faces(model); open > notable) {
-    context.note(
-        fmt::format("stress at the faces: the theory of thin shells itself is uncertain by about {} in the mean over "
-                    "the wall (half "
-                    "of the thickness over the radius of a vessel, all of it of a ball), beside any error of the mesh; "
-                    "the membrane "
-                    "stress is not concerned",
-                    percent_text(open)));
+    context.note(fmt::format(
+        "stress at the faces: thin-shell theory itself is uncertain by about {} here, in the mean over the wall, "
+        "beside any error of the mesh; the membrane stress is not affected",
+        percent_text(open)));
   }
   warn_of(subject, contact_warnings(record), context);
   if (recorded.crossing()) {
@@ -597,10 +595,11 @@ void announce_outputs(const SimulateSettings& settings, bool resumed, const Cont
   }
 }
 
-LoadedRun load_run(SimulateSettings& settings, const Context& context) {
+LoadedRun load_run(const SimulateSettings& settings, const Context& context) {
   const Scene& scene = settings.scene;
   LoadedRun loaded;
   loaded.asked = scene_text(scene, settings.out);
+  loaded.inputs = settings.inputs;
   LoadedScene read = load_scene(scene);
   loaded.model = std::move(read.model);
   loaded.space = std::move(read.space);
@@ -618,9 +617,10 @@ LoadedRun load_run(SimulateSettings& settings, const Context& context) {
   return loaded;
 }
 
-void simulate(SimulateSettings& settings, LoadedRun loaded, std::optional<RunJournal> before, RunRecord& record,
+void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJournal> before, RunRecord& record,
               const Context& context) {
   Scene& scene = settings.scene;
+  settings.inputs = loaded.inputs;
   const std::string subject = settings.inputs.front().string();
   Stages stage{context};
   stage("setup");
@@ -631,7 +631,8 @@ void simulate(SimulateSettings& settings, LoadedRun loaded, std::optional<RunJou
     stage("solve");
     system = choose_model(settings, loaded, system->model(), record, context);
   }
-  const bool has_estimates = record.accuracy || may_refine(settings, loaded);
+  // A target that is named and cannot serve is warned of with what to do about it.
+  const bool has_estimates = record.accuracy || may_refine(settings, loaded) || settings.target;
   std::ranges::for_each(doubts(system->model(), scene.run, has_estimates), context.warn);
   std::ranges::for_each(doubts_of_ends(system->model()), context.warn);
   if (settings.out.empty()) {

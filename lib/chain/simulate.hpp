@@ -49,7 +49,8 @@ struct SimulateSettings {
 
 /// A scene with its meshes at hand.
 struct LoadedRun {
-  std::string asked;  ///< the scene as a text, before an accuracy chose of it
+  std::string asked;                          ///< the scene as a text
+  std::vector<std::filesystem::path> inputs;  ///< all that have been read, those of the settings first
   Model model;
   std::vector<std::unique_ptr<Target>> targets;  ///< what each body's shells were fitted to, or none
   std::optional<double> voxel;                   ///< mm, longest edge, of the image behind them
@@ -65,14 +66,14 @@ void announce_outputs(const SimulateSettings& settings, bool resumed, const Cont
 
 /// Reads the meshes of a scene and the targets of its shells, and warns of what they are.
 /// Errors: InputError: as load_scene(); a target that the shells were not fitted to.
-LoadedRun load_run(SimulateSettings& settings, const Context& context);
+LoadedRun load_run(const SimulateSettings& settings, const Context& context);
 
 /// Solves a scene: for an accuracy, under the pressure of the image, from where a run was stopped. Writes the result,
 /// exports and picture, and warns of what makes the answers doubtful.
 /// @param journal  of a run that goes on; @param record  what is known so far, also where this fails
 /// Errors: InputError: as System and solve(), or another run goes on; RequirementError: no state of rest, or an
 /// accuracy that is not reached: what there is stays in `out`.part; OutputError.
-void simulate(SimulateSettings& settings, LoadedRun loaded, std::optional<RunJournal> journal, RunRecord& record,
+void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJournal> journal, RunRecord& record,
               const Context& context);
 
 }  // namespace tunica::chain

@@ -58,7 +58,7 @@ std::string named(const Label& label);
 std::string no_label_text(const std::filesystem::path& volume, const VolumeContents& contents,
                           const std::string& asked);
 
-/// What `tunica-extract --info` prints of a volume and adds to its report (`docs/command-line.md`).
+/// What `tunica-extract --info` prints of a volume and adds to its report (`docs/report-keys.md`).
 /// @param shells  of the chain whose memory is estimated per label
 std::pair<std::string, Json> volume_info(const std::filesystem::path& volume, const VolumeFile& file,
                                          const VolumeContents& contents, std::size_t shells);

@@ -8,7 +8,7 @@
 namespace tunica::cli {
 namespace {
 
-constexpr rlim_t enough = rlim_t{4} << 20U;
+constexpr rlim_t least_stack = rlim_t{4} << 20U;
 
 struct Work {
   const std::function<void()>& run;
@@ -27,11 +27,11 @@ void* run_work(void* work) {
 
 bool is_enough_here() {
   rlimit limit{};
-  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= enough) {
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= least_stack) {
     return true;
   }
-  limit.rlim_cur = enough;  // the stack of a program's first thread grows to what the limit is by then
-  return limit.rlim_max >= enough && ::setrlimit(RLIMIT_STACK, &limit) == 0;
+  limit.rlim_cur = least_stack;  // the stack of a program's first thread grows to what the limit is by then
+  return limit.rlim_max >= least_stack && ::setrlimit(RLIMIT_STACK, &limit) == 0;
 }
 
 }  // namespace
@@ -44,7 +44,7 @@ void with_enough_stack(const std::function<void()>& work) {
   Work mine{work, nullptr};
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, enough);
+  pthread_attr_setstacksize(&attributes, least_stack);
   pthread_t thread{};
   const bool started = pthread_create(&thread, &attributes, run_work, &mine) == 0;
   pthread_attr_destroy(&attributes);

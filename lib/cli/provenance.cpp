@@ -1,6 +1,7 @@
 #include "tunica/cli/provenance.hpp"
 
 #include "tunica/core/version.hpp"
+#include "tunica/core/words.hpp"
 #include "tunica/io/file/output_file.hpp"
 
 #include <fmt/format.h>
@@ -22,19 +23,47 @@ std::string whole_ending(const fs::path& path) {
                                                                                                          : last;
 }
 
+/// Whether a word ends as a file's name does.
+bool has_file_ending(const std::string& word) {
+  static constexpr std::array<std::string_view, 38> endings{
+      ".ply",  ".obj",   ".stl", ".off",  ".glb", ".3mf", ".hdf", ".h5",   ".hdf5", ".vtkhdf",
+      ".json", ".toml",  ".nii", ".gz",   ".hdr", ".img", ".mha", ".mhd",  ".raw",  ".zraw",
+      ".nrrd", ".nhdr",  ".tif", ".tiff", ".png", ".svg", ".csv", ".html", ".tsv",  ".ctbl",
+      ".lut",  ".label", ".msh", ".vtk",  ".vtu", ".pvd", ".xmf", ".part"};
+  return std::ranges::find(endings, fs::path(word).extension().string()) != endings.end();
+}
+
 /// Whether a word of the command line names a file, also one that the run does not get to.
 bool is_file_word(const std::string& word) {
-  static constexpr std::array<std::string_view, 34> endings{
-      ".ply", ".obj", ".stl",  ".off", ".glb", ".3mf", ".hdf", ".h5",   ".hdf5", ".vtkhdf", ".json", ".toml",
-      ".nii", ".gz",  ".hdr",  ".img", ".mha", ".mhd", ".raw", ".nrrd", ".nhdr", ".tif",    ".tiff", ".png",
-      ".svg", ".csv", ".html", ".tsv", ".msh", ".vtk", ".vtu", ".pvd",  ".xmf",  ".part"};
   std::error_code ignored;
   if (word.empty() || word.front() == '-') {
     return false;
   }
   const fs::path path(word);
-  return std::ranges::find(endings, path.extension().string()) != endings.end() || fs::exists(path, ignored) ||
+  return has_file_ending(word) || fs::exists(path, ignored) ||
          (word.find('/') != std::string::npos && fs::is_directory(path.parent_path(), ignored));
+}
+
+/// Whether a word is what stands in the place of a name.
+bool is_label(const std::string& word) {
+  return word.starts_with("OUT.") || word.starts_with("FILE.") ||
+         (word.starts_with("input") && word.size() > 5 && std::isdigit(static_cast<unsigned char>(word[5])) != 0);
+}
+
+/// Names of files that the run does not know of, such as those that a header names.
+std::string without_other_names(const std::string& text) {
+  constexpr const char* ends = " \t\n'\"(),;:=";
+  std::string left;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of(ends, at), text.size());
+    const std::string word = text.substr(at, end - at);
+    left += has_file_ending(word) && !is_label(word) ? "FILE" + whole_ending(word) : word;
+    if (end < text.size()) {
+      left += text[end];
+    }
+    at = end + 1;
+  }
+  return left;
 }
 
 /// A flag and its value in one word.
@@ -63,24 +92,6 @@ void replace_words(std::string& text, const std::string& what, const std::string
 
 }  // namespace
 
-std::string shell_quoted(const std::string& word) {
-  const bool plain = !word.empty() && word.find_first_not_of(
-                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                          "0123456789_-+./,:=%@{}") == std::string::npos;
-  if (plain) {
-    return word;
-  }
-  std::string quoted = "'";
-  for (const char c : word) {
-    if (c == '\'') {
-      quoted += "'\\''";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + "'";
-}
-
 void Provenance::hide_paths() {
   hides_ = true;
   for (std::size_t i = 1; i < words_.size(); ++i) {
@@ -105,9 +116,15 @@ void Provenance::hide(const fs::path& path, const std::string& label) {
     add(way.string(), label);
     if (way.has_parent_path()) {
       add(way.parent_path().string() + "/", "");
+      if (way.parent_path().has_parent_path() && way.parent_path() != "/") {  // else it may be any word of a message
+        add(way.parent_path().string(), "FOLDER");
+      }
     }
   }
   add(path.filename().string(), label);
+  if (path.extension() == ".part") {
+    add(path.stem().string(), "FILE" + whole_ending(path.stem()));
+  }
   std::ranges::stable_sort(hidden_, std::ranges::greater(), [](const auto& pair) { return pair.first.size(); });
 }
 
@@ -182,7 +199,7 @@ std::string Provenance::redact(std::string text) const {
   for (const auto& [what, by] : hidden_) {
     replace_words(text, what, by);
   }
-  return text;
+  return hides_ ? without_other_names(text) : text;
 }
 
 }  // namespace tunica::cli

@@ -53,7 +53,4 @@ private:
   bool hides_ = false;
 };
 
-/// A word as a shell needs it typed.
-std::string shell_quoted(const std::string& word);
-
 }  // namespace tunica::cli

@@ -282,7 +282,7 @@ void AccuracyFlags::declare(Tool& tool) {
   CLI::App& app = tool.arguments();
   tool.group("Accuracy");
   app.add_option("--accuracy", within,
-                 "choose mesh and model: finer shells, until the error of the answer is credibly below this, e.g. 2%")
+                 "choose mesh and model: finer shells, until the estimated error of the answer is below this, e.g. 2%")
       ->type_name("PERCENT");
   app.add_option("--of", of, fmt::format("the answer: {} (default displacement)", words_of(answers, " | ")))
       ->type_name("NAME");

@@ -100,6 +100,20 @@ bool is_given(const std::vector<std::string>& words, const char* flag) {
   return std::find(words.begin(), end_of_options(words), flag) != end_of_options(words);
 }
 
+// What was given, by flag or by the name of a place: its value, its values, or true where it takes none.
+Json arguments_of(const CLI::App& app) {
+  Json given = Json::object();
+  for (const CLI::Option* option : app.get_options()) {
+    const std::vector<std::string>& values = option->results();
+    if (!values.empty()) {
+      given[option->get_name()] = option->get_items_expected_max() == 0 ? Json(true)
+                                  : values.size() == 1                  ? Json(values.front())
+                                                                        : Json(values);
+    }
+  }
+  return given;
+}
+
 // The report of a run whose command line could not be parsed: then no option has been stored yet.
 std::filesystem::path report_argument(const std::vector<std::string>& all) {
   const std::vector<std::string> words(all.begin(), end_of_options(all));
@@ -319,6 +333,7 @@ std::optional<int> Tool::parse(int argc, char** argv) {
       throw UsageError(short_usage(app_));
     }
     app_.parse(argc, argv);
+    arguments_ = arguments_of(app_);
     parse_common();
     return std::nullopt;
   } catch (const CLI::Success&) {
@@ -582,6 +597,7 @@ void Tool::write_report(bool ok, const std::string& error, const Json& result) {
       {"warning_weights", weights},
       {"notes", texts_of(notes)},
       {"command", provenance_.command()},
+      {"arguments", arguments_},
       {"inputs", inputs_},
       {"outputs", describe_outputs(ok)},
       {"seconds", seconds},

@@ -200,6 +200,7 @@ private:
   Json result_ = Json::object();
   std::function<Json()> make_result_;  ///< in place of it
   Json stated_;
+  Json arguments_ = Json::object();  ///< of the command line
   std::vector<std::function<void()>> after_parse_;
   std::filesystem::file_time_type start_on_disk_;
   Clock::time_point start_ = Clock::now();

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <new>
 #include <numbers>
 
@@ -27,6 +28,13 @@ cairo_font_face_t* font_face() {
     return cairo_ft_font_face_create_for_ft_face(font, FT_LOAD_NO_HINTING);
   }();
   return face;
+}
+
+// A text is as wide at any size.
+std::unique_ptr<cairo_font_options_t, decltype(&cairo_font_options_destroy)> unhinted() {
+  cairo_font_options_t* const options = cairo_font_options_create();
+  cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
+  return {options, &cairo_font_options_destroy};
 }
 
 cairo_status_t append(void* to, const unsigned char* bytes, unsigned count) {
@@ -54,10 +62,8 @@ Canvas::Canvas(int width, int height)
   cairo_set_source_rgb(cairo_, 1, 1, 1);
   cairo_paint(cairo_);
   cairo_set_font_face(cairo_, font_face());
-  cairo_font_options_t* const options = cairo_font_options_create();
-  cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
-  cairo_set_font_options(cairo_, options);
-  cairo_font_options_destroy(options);
+  const auto options = unhinted();
+  cairo_set_font_options(cairo_, options.get());
   require_success(cairo_status(cairo_));
 }
 
@@ -66,10 +72,17 @@ Canvas::~Canvas() {
   cairo_surface_destroy(surface_);
 }
 
-double Canvas::text_width(const std::string& text, double size) const {
-  cairo_set_font_size(cairo_, size);
+double text_width(const std::string& text, double size) {
+  cairo_matrix_t scale;
+  cairo_matrix_t identity;
+  cairo_matrix_init_scale(&scale, size, size);
+  cairo_matrix_init_identity(&identity);
+  const auto options = unhinted();
+  const std::unique_ptr<cairo_scaled_font_t, decltype(&cairo_scaled_font_destroy)> font(
+      cairo_scaled_font_create(font_face(), &scale, &identity, options.get()), &cairo_scaled_font_destroy);
+  require_success(cairo_scaled_font_status(font.get()));
   cairo_text_extents_t extents;
-  cairo_text_extents(cairo_, printable(text).c_str(), &extents);
+  cairo_scaled_font_text_extents(font.get(), printable(text).c_str(), &extents);
   return extents.x_advance;
 }
 

@@ -54,11 +54,12 @@ struct Chart {
   std::string series_title;  ///< heading of the legend
   std::vector<ChartSeries> series;
   std::optional<ChartGuide> guide;
+  bool of_one_problem = true;  ///< its runs may be better or worse than each other: then it has a Pareto front
 };
 
 /// For each mark of each series whether it is on the Pareto front: no other mark is better in one coordinate and at
-/// least as good in the other; none where an axis is not ranked. Errors: InputError: a mark that is not finite.
-/// Cost: n log n.
+/// least as good in the other; none where an axis is not ranked, or the runs are of several problems. Errors:
+/// InputError: a mark that is not finite. Cost: n log n.
 std::vector<std::vector<bool>> pareto_front(const Chart& chart);
 
 /// The scale that an automatic axis gets for these values.
@@ -66,7 +67,7 @@ Scale resolved_scale(Scale wanted, const std::vector<double>& values);
 
 /// Draws a chart as SVG: round ticks, light grid, marks that differ in colour and shape (colour-blind-safe), the Pareto
 /// front, where both axes are ranked, as a dashed staircase, a legend below. As wide as a column of text: readable at
-/// 380 pixels, too. Plain text in the reader's own sans-serif font; UTF-8.
+/// 380 pixels, too. Text in the reader's own sans-serif font, as wide as in the font of pictures; UTF-8.
 /// @param chart  finite values (else InputError); a chart without marks gives empty axes
 /// Limits: beyond 40 series the legend ends with "and … more".
 std::string chart_svg(const Chart& chart);

@@ -119,7 +119,7 @@ Legend chart_legend(const Chart& chart, double top) {
   return legend;
 }
 
-bool has_front(const Chart& chart) { return chart.x.is_ranked && chart.y.is_ranked; }
+bool has_front(const Chart& chart) { return chart.of_one_problem && chart.x.is_ranked && chart.y.is_ranked; }
 
 bool has_failures(const Chart& chart) {
   return std::ranges::any_of(chart.series, [](const ChartSeries& series) { return !series.failures.empty(); });

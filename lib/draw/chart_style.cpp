@@ -77,8 +77,12 @@ std::string full_mark(std::size_t series) { return fill_and_stroke(series_ink(se
 std::string hollow_mark(Ink line) { return fill_and_stroke(Ink::paper, line, 2); }
 
 std::string text_element(double x, double y, const std::string& text, double size, const std::string& attributes) {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.1f}\" {}>{}</text>\n", x, y, size, attributes,
-                     safe(text));
+  // The reader's font may be wider than the one that is measured.
+  const double width = text_width(text, size) * (attributes.find("bold") != std::string::npos ? bold_width : 1);
+  return fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.1f}\" textLength=\"{:.1f}\" "
+      "lengthAdjust=\"spacingAndGlyphs\" {}>{}</text>\n",
+      x, y, size, width, attributes, safe(text));
 }
 
 std::string line_element(double x0, double y0, double x1, double y1, const std::string& attributes) {

@@ -1,6 +1,7 @@
 #include "tunica/draw/chart.hpp"
 
 #include "tunica/core/error.hpp"
+#include "tunica/draw/detail/chart_legend.hpp"
 
 #include <fmt/format.h>
 
@@ -27,7 +28,7 @@ std::vector<std::vector<bool>> pareto_front(const Chart& chart) {
       entries.push_back({chart.x.more_is_better ? -mark.x : mark.x, chart.y.more_is_better ? -mark.y : mark.y, s, m});
     }
   }
-  if (!chart.x.is_ranked || !chart.y.is_ranked) {
+  if (!has_front(chart)) {
     return front;
   }
   std::ranges::sort(entries, [](const Entry& a, const Entry& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });

@@ -269,7 +269,7 @@ private:
     double x = box_.left + 4;
     const auto tell = [&](const std::string& text) {
       canvas_.text(text, x + 12, base, letter_size, black);
-      x += 12 + canvas_.text_width(text, letter_size) + gap;
+      x += 12 + text_width(text, letter_size) + gap;
     };
     const double width = length * pixels_per_mm;
     canvas_.line(x, middle, x + width, middle, 3, black);
@@ -307,7 +307,7 @@ private:
     const std::vector<std::string> lines = wrapped(options_.quantity, room, letter_size);
     double y = bar_top - (options_.diagonal ? 88 : 60) - 28 * real(lines.size());
     for (const std::string& line : lines) {
-      const double half = canvas_.text_width(line, letter_size) / 2;
+      const double half = text_width(line, letter_size) / 2;
       canvas_.text(line, std::min(middle, picture_width - 12 - half), y += 28, letter_size, black, Align::centre);
     }
     for (int i = 0; i < 256; ++i) {

@@ -64,26 +64,6 @@ std::string safe(const std::string& text) {
   return out;
 }
 
-double text_width(const std::string& text, double size) {
-  double units = 0;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xc0) == 0x80) {
-      continue;
-    }
-    if (std::string_view("iljtfI.,:;|!'()[]/ -").find(c) != std::string_view::npos) {
-      units += 0.34;
-    } else if (std::string_view("mwMW%@").find(c) != std::string_view::npos) {
-      units += 0.92;
-    } else if (c >= 'A' && c <= 'Z') {
-      units += 0.71;
-    } else {
-      units += 0.59;
-    }
-  }
-  return units * size;
-}
-
 std::string shortened(const std::string& text, std::size_t most) {
   const std::string clean = valid_utf8(text);
   std::vector<std::string> characters;

@@ -31,7 +31,7 @@ constexpr double fewer_by = 0.92;    // of the shells: the next count to be trie
 constexpr int certificates = 16;     // each followed by splits
 constexpr int patience = 3;          // rounds in a row that bring nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
-constexpr double exchanged = 0.05;         // of the shells, in a round; half as many where that brought nothing
+constexpr double exchange_share = 0.05;    // of the shells, in a round; half as many where that brought nothing
 
 /// Certifies shells, says what is wrong with them, and keeps the best.
 class Certifier {
@@ -349,7 +349,7 @@ private:
   /// @return the largest error, mm
   double closest(FitMesh& mesh, const FitSamples& samples, std::size_t shells, double enough) {
     double error = reduce(mesh, samples, shells);
-    double share = exchanged;
+    double share = exchange_share;
     for (int fruitless = 0; error > enough && rounds_ > 0 && fruitless < patience;) {
       --rounds_;
       FitMesh other = mesh;

@@ -14,8 +14,8 @@
 namespace tunica {
 namespace {
 
-constexpr std::size_t tried_at_once = 8;  // collapses, whatever the number of threads
-constexpr double split_may_miss = 0.1;    // of shapes: as much as keeps a corner's normal fit for a shell
+constexpr std::size_t batch_size = 8;    // collapses, whatever the number of threads
+constexpr double split_shortfall = 0.1;  // of shapes: as much as keeps a corner's normal fit for a shell
 
 /// An edge that may go, and what that is known or guessed to cost.
 struct Candidate {
@@ -91,7 +91,7 @@ private:
 
   void try_some() {
     std::vector<Candidate> some;
-    while (!queue_.empty() && some.size() < tried_at_once && !is_known(queue_.top())) {
+    while (!queue_.empty() && some.size() < batch_size && !is_known(queue_.top())) {
       const Candidate c = queue_.top();
       queue_.pop();
       if (c.error <= limits_.error && !mesh_.around[c.u].empty() && !mesh_.around[c.v].empty()) {
@@ -265,7 +265,7 @@ std::size_t split_worst(FitMesh& mesh, const FitSamples& samples, const FitLimit
     }
     FitLimits anything = limits;  // an error outweighs shapes, which are mended afterwards
     anything.shape.min_angle = limits.shape.min_angle / 2;
-    anything.may_miss = split_may_miss;
+    anything.may_miss = split_shortfall;
     Trial trial;
     trial.error = infinity;
     const auto consider = [&](Edit edit) {

@@ -18,12 +18,12 @@
 namespace tunica {
 namespace {
 
-constexpr double crease_angle = 60;       // degrees
-constexpr double crease_length = 0.15;    // of the diagonal: less is texture, such as that of voxels
-constexpr double crease_share = 0.6;      // of the angle: coarser facets turn by less
-constexpr double close_by = 0.2;          // of an edge's length: a chord leaves a curved crease
-constexpr std::size_t sampled = 20'000;   // vertices, and facets: for the error of flat facets
-constexpr std::size_t first_rung = 4000;  // triangles of the first decimation, from which the count is judged
+constexpr double crease_angle = 60;           // degrees
+constexpr double crease_length = 0.15;        // of the diagonal: less is texture, such as that of voxels
+constexpr double crease_share = 0.6;          // of the angle: coarser facets turn by less
+constexpr double close_by = 0.2;              // of an edge's length: a chord leaves a curved crease
+constexpr std::size_t sample_count = 20'000;  // vertices, and facets: for the error of flat facets
+constexpr std::size_t first_rung = 4000;      // triangles of the first decimation, from which the count is judged
 
 /// Largest sampled distance between flat facets and target, both ways, mm.
 double sampled_error(const TriangleMesh& mesh, const Target& target) {
@@ -33,12 +33,13 @@ double sampled_error(const TriangleMesh& mesh, const Target& target) {
   };
   TriangleMesh some;
   const auto& vertices = target.mesh().vertices;
-  for (std::size_t v = 0; v < vertices.size(); v += std::max<std::size_t>(1, vertices.size() / sampled)) {
+  for (std::size_t v = 0; v < vertices.size(); v += std::max<std::size_t>(1, vertices.size() / sample_count)) {
     some.vertices.push_back(vertices[v]);
   }
   const double to_mesh = largest(some, ClosestPoint(mesh));
   some.vertices.clear();
-  for (std::size_t t = 0; t < mesh.triangles.size(); t += std::max<std::size_t>(1, mesh.triangles.size() / sampled)) {
+  for (std::size_t t = 0; t < mesh.triangles.size();
+       t += std::max<std::size_t>(1, mesh.triangles.size() / sample_count)) {
     const auto& [a, b, c] = mesh.triangles[t];
     const Vec3 &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
     some.vertices.insert(some.vertices.end(), {(p + q + r) / 3, (p + q) / 2, (q + r) / 2, (r + p) / 2});

@@ -1,7 +1,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/quantity.hpp"
 #include "tunica/draw/picture.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/report/detail/sections.hpp"
 
@@ -143,7 +143,7 @@ Markup discretisation(const CaseReport& one) {
     return part("error_unknown", {{"of", of}});
   }
   return part("error_of_accuracy", {{"of", of},
-                                    {"how", credible ? "credibly below" : "estimated at"},
+                                    {"how", credible ? "below" : "estimated at"},
                                     {"percent", figure_above(*reached->percent)},
                                     {"asked", figure(reached->asked)},
                                     {"doubt", credible ? "" : ", which is not credible"}});
@@ -304,21 +304,19 @@ std::string rounded_quantity(const std::string& text) {
   return value ? fmt::format("{:.6g} {}", *value, text.substr(unit)) : text;
 }
 
-// The lines of the resolved scene: heads without the mesh's own path come out as they are.
+// The resolved scene, but for the places of meshes.
 Markup inputs(const CaseReport& one) {
   std::vector<Line> lines;
-  std::string table;
-  std::istringstream text(one.scene);
-  for (std::string line; std::getline(text, line);) {
-    const std::size_t equals = line.find(" = ");
-    if (line.starts_with("[")) {
-      const std::size_t begin = line.find_first_not_of('[');
-      table = line.substr(begin, line.find(']') - begin);
-    } else if (equals != std::string::npos && !line.starts_with("mesh = ")) {
-      std::string value = line.substr(equals + 3);
-      const bool quoted = value.size() >= 2 && value.front() == '"' && value.back() == '"';
-      lines.push_back({table + " · " + line.substr(0, equals),
-                       quoted ? rounded_quantity(value.substr(1, value.size() - 2)) : value});
+  const Json scene = one.source.at("simulate", "stated.scene");
+  for (const auto& [section, tables] : scene.items()) {
+    for (const Json& item : tables.is_array() ? tables : Json::array({tables})) {
+      for (const auto& [key, value] : item.items()) {
+        if (key != "mesh") {
+          lines.push_back(
+              {one.redacted(section + " · " + key),
+               one.redacted(value.is_string() ? rounded_quantity(value.get<std::string>()) : value.dump())});
+        }
+      }
     }
   }
   return table_of("Inputs as stated", stated_lines(one)) += table_of("All settings as resolved, SI units", lines);
@@ -416,21 +414,16 @@ std::string told_exit(const PipelineCase& one) {
 
 namespace {
 
-// With another value of a flag, which is added where it is not there. Values of these flags hold no blanks.
-std::string with_flag(const std::string& command, const std::string& flag, const std::string& value) {
-  std::string made = command;
-  for (const char* const mark : {" ", "="}) {
-    const std::string given = " " + flag + mark;
-    if (const std::size_t at = made.find(given); at != std::string::npos) {
-      const std::size_t end = std::min(made.find(' ', at + given.size()), made.size());
-      return made.replace(at, end - at, given + value);
-    }
-  }
-  return made + " " + flag + " " + value;
+// The command of the stage that failed, with another value of a flag.
+std::string command_with(const CaseReport& one, const char* flag, const Json& value) {
+  Json arguments = arguments_of(one.source, one.source.stage);
+  arguments[flag] = value;
+  arguments["--force"] = true;  // its report is there
+  return one.redacted(command_of("tunica-" + one.source.stage, arguments));
 }
 
 // Of a run whose accuracy was not reached: finer shells, or what was reached as the request.
-std::vector<NextStep> steps_to_accuracy(const CaseReport& one, const std::string& command) {
+std::vector<NextStep> steps_to_accuracy(const CaseReport& one) {
   constexpr double margin = 1.25;  // of the estimate, which is to be below the request
   const Json levels = one.source.at("simulate", "result.accuracy.levels");
   const Json last = levels.is_array() && !levels.empty() && levels.back().is_object() ? levels.back() : Json::object();
@@ -440,15 +433,15 @@ std::vector<NextStep> steps_to_accuracy(const CaseReport& one, const std::string
     constexpr std::size_t split = 4;  // each shell of a level in the next one
     // Two levels more, as the next one alone may fall short.
     const std::size_t most = split * split * shells.get<std::size_t>();
-    steps.push_back({fmt::format("Next, finer (up to {} shells)", most),
-                     one.redacted(with_flag(command, "--max-shells", std::to_string(most)))});
+    steps.push_back(
+        {fmt::format("Next, finer (up to {} shells)", most), command_with(one, "--max-shells", std::to_string(most))});
   }
   const Json reasons = one.source.at("simulate", "result.accuracy.reasons");
   const auto percent = accuracy_reached(one.source)->percent;
   // With more than one reason another one than the number of shells stands against any accuracy.
   if (percent && reasons.is_array() && reasons.size() == 1) {
-    steps.push_back({"Or, content with what was reached",
-                     one.redacted(with_flag(command, "--accuracy", figure_above(margin * *percent) + "%"))});
+    steps.push_back(
+        {"Or, content with what was reached", command_with(one, "--accuracy", figure_above(margin * *percent) + "%")});
   }
   return steps;
 }
@@ -462,20 +455,19 @@ std::vector<NextStep> next_steps(const CaseReport& one) {
     return {};
   }
   if (is_inaccurate(source)) {
-    return steps_to_accuracy(one, command);
+    return steps_to_accuracy(one);
   }
   const Json volumes = source.at("extract", "inputs");
   if (source.stage == "extract" && source.exit == "3" && volumes.is_array() && !volumes.empty()) {
-    // The volume is the first word after the tool that is no flag; what is in it is what to look at.
-    const std::size_t blank = command.find(' ');
-    const std::vector<std::string> words = command_words(command);
-    const std::size_t quoted =
-        command.find(" '") == blank ? command.find("' ", blank + 2) + 1 : command.find(' ', blank + 1);
-    return {{"Next", words.size() > 1 && !words[1].starts_with("-")
-                         ? one.redacted(command.substr(0, quoted) + " --info")
-                         : one.redacted(command + " --verbose")}};
+    // What is in the volume is what to look at.
+    std::error_code unknown;
+    if (const auto volume = argument(source, "extract", "VOLUME");
+        volume && std::filesystem::exists(*volume, unknown)) {
+      return {{"Next", one.redacted(command_of("tunica-extract", {{"VOLUME", *volume}, {"--info", true}}))}};
+    }
   }
-  return {{"Next", one.redacted(command + " --verbose")}};
+  return {{"Next", arguments_of(source, source.stage).empty() ? one.redacted(command + " --verbose")
+                                                              : command_with(one, "--verbose", true)}};
 }
 
 Markup case_section(const CaseReport& one, int level, bool paths) {

@@ -259,11 +259,10 @@ DrawnResult unloaded(const fs::path& path) {
 
 // Of a result without the page's data, as older tools left it.
 std::string untold_result(const CaseReport& one) {
-  const Json command = one.source.at("simulate", "command");
-  const std::string said = command.is_string() ? command.get<std::string>() : "tunica-simulate";
-  const bool forced = (said + " ").find(" --force ") != std::string::npos;
+  Json arguments = arguments_of(one.source, "simulate");
+  arguments["--force"] = true;
   return one.redacted("result.page is missing, as in results of older versions: the loaded organ is not drawn; " +
-                      said + (forced ? "" : " --force") + " draws it");
+                      command_of("tunica-simulate", arguments) + " draws it");
 }
 
 void draw_shells(CaseReport& one, const Room& room, DrawnShells shells, const std::optional<TriangleMesh>& surface,
@@ -325,7 +324,6 @@ void draw_organ(CaseReport& one, const Room& room) {
     result = attempt(one, "shell.ply", unloaded);
   }
   if (result) {
-    one.scene = one.redacted(result->scene);
     try {
       DrawnShells shells = thinned(std::move(*result), room.triangles);
       const std::size_t of_state = bytes_of_point * (shells.reference.vertices.size() + shells.solids.vertices.size());

@@ -4,7 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/version.hpp"
 #include "tunica/io/file/encoding.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 #include "tunica/report/detail/embedded.hpp"
 #include "tunica/report/detail/organ.hpp"
 #include "tunica/report/detail/sections.hpp"
@@ -36,8 +36,8 @@ void name_organs(std::vector<CaseReport>& cases) {
     folders_of[volume.filename()].insert(volume.parent_path().lexically_normal());
   }
   for (CaseReport& one : cases) {
-    // The label that was extracted as the command names it; empty: at an isovalue, or not known.
-    const std::string label = flag_value(words_of(one.source, "extract"), "--label").value_or("");
+    // The label that was extracted as it was named; empty: at an isovalue, or not known.
+    const std::string label = argument(one.source, "extract", "--label").value_or("");
     const fs::path file = volume_of(one).filename();
     const std::string name = folders_of[file].size() > 1 ? file.string() : "";
     one.organ_kind = label + "\n" + name;

@@ -2,7 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/core/quantity.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 
 #include <fmt/format.h>
 
@@ -51,7 +51,7 @@ void replace_all(std::string& text, const std::string& name, const std::string& 
 // Whether a word with a slash is a number with its unit.
 bool is_quantity(const std::string& word) {
   constexpr std::array with_slash{dimension::density, dimension::acceleration, dimension::force_per_length,
-                                  dimension::rate, dimension::pressure};
+                                  dimension::rate,    dimension::pressure,     dimension::bedding};
   return std::ranges::any_of(with_slash, [&](const Dimension& expected) {
     try {
       (void)parse_quantity(word, expected);
@@ -113,10 +113,13 @@ Redaction::Redaction(const PipelineCase& one, std::size_t number) : active_(true
     for (const auto& [path, hash] : one.files(stage, "outputs")) {
       forget(path.string(), path.filename().string());
     }
-    for (const std::string& word : words_of(one, stage)) {
-      if (word.find('/') != std::string::npos && !is_quantity(word)) {
-        const bool volume = stage == "extract" && !word.ends_with(".ply") && !word.ends_with(".json");
-        forget(word, volume ? "VOLUME" : fs::path(word).filename().string());
+    const Json arguments = arguments_of(one, stage);
+    for (const auto& [name, value] : arguments.items()) {
+      for (const Json& part : value.is_array() ? value : Json::array({value})) {
+        const std::string word = part.is_string() ? part.get<std::string>() : "";
+        if (word.find('/') != std::string::npos && !is_quantity(word)) {
+          forget(word, name == "VOLUME" ? name : fs::path(word).filename().string());
+        }
       }
     }
   }

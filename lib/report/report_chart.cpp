@@ -8,8 +8,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <set>
 #include <utility>
 
 namespace tunica {
@@ -20,6 +23,83 @@ using Numbers = std::vector<std::optional<double>>;
 // The error of the answer as the run itself estimates it: of a run for an accuracy, and of any other run with a target.
 constexpr const char* estimate_key = "result.accuracy.estimate_percent";
 constexpr const char* membrane_estimate_key = "result.estimates.membrane_p99_mpa.percent";
+
+struct KeyWords {
+  std::string label, unit;
+};
+
+// What a dotted key names, and its unit; no words where it names nothing.
+KeyWords words_of_key(const std::string& key) {
+  static const std::map<std::string, std::string> units{
+      {"percent", "%"}, {"mm", "mm"},   {"mm2", "mm²"},      {"mm3", "mm³"}, {"deg", "°"},
+      {"mj", "mJ"},     {"hz", "Hz"},   {"s", "s"},          {"rad", "rad"}, {"mib", "MiB"},
+      {"ms", "ms"},     {"mpa", "MPa"}, {"n_per_mm", "N/mm"}};
+  std::vector<std::string> parts;
+  for (std::size_t start = 0; start <= key.size();) {
+    const std::size_t dot = std::min(key.find('.', start), key.size());
+    parts.push_back(key.substr(start, dot - start));
+    start = dot + 1;
+  }
+  std::string unit;
+  std::vector<std::string> words;
+  bool distance = false;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    std::string part = parts[i];
+    if (i + 1 < parts.size() && (part == "result" || part == "iterations" || part == "probes" || part == "study")) {
+      continue;
+    }
+    if (part == "*" || (!part.empty() && part.find_first_not_of("0123456789-") == std::string::npos)) {
+      continue;
+    }
+    if (part == "seconds") {
+      unit = "s";
+      words.emplace_back(i + 1 < parts.size() && parts[i + 1] == "total" ? "total time" : "time");
+      if (i + 1 < parts.size()) {
+        if (parts[i + 1] != "total") {
+          words.back() += " to " + parts[i + 1];
+        }
+        ++i;
+      }
+      continue;
+    }
+    if (part == "ms_per_step") {
+      unit = "ms";
+      words.emplace_back("time per step");
+      continue;
+    }
+    if (const auto found = units.find(part); found != units.end() && i > 0) {
+      unit = found->second;
+      continue;
+    }
+    for (std::size_t at = part.find('_'); at != std::string::npos; at = part.find('_', at + 1)) {
+      if (const auto found = units.find(part.substr(at + 1)); found != units.end()) {
+        unit = found->second;
+        part.resize(at);
+        break;
+      }
+    }
+    distance = distance || part.find("hausdorff") != std::string::npos || part.find("one_sided") != std::string::npos ||
+               part == "mean" || part == "rms";
+    part = part == "hausdorff"        ? "Hausdorff distance"
+           : part == "flat_hausdorff" ? "Hausdorff distance of the flat facets"
+           : part == "one_sided"      ? "one-sided distance"
+           : part == "mean"           ? "mean distance"
+           : part == "rms"            ? "root mean square distance"
+           : part == "upper"          ? "upper bound"
+           : part == "lower"          ? "lower bound"
+           : part == "dof"            ? "degrees of freedom"
+           : part == "estimate"       ? "estimated error"
+           : part == "estimates"      ? "estimated error"
+           : part == "membrane_p99"   ? "membrane stress p99"
+           : part == "peak"           ? "peak memory"
+           : part == "triangles_in"   ? "triangles before"
+                                      : part;
+    std::ranges::replace(part, '_', ' ');
+    words.push_back(part);
+  }
+  std::string label = fmt::format("{}", fmt::join(words, ", "));
+  return {std::move(label), unit == "%" && distance ? "% of the diagonal" : unit};
+}
 
 // A coordinate of the chart: its key or name, its label, and the values of each report.
 struct Coordinate {
@@ -119,12 +199,10 @@ Coordinate key_against_reference(const std::vector<Report>& reports, const std::
     throw InputError(fmt::format("{}: the reference has no number under '{}'", reference.path.string(), key));
   }
   Coordinate error = by_key(reports, key);
-  const std::string label = error.label.substr(0, error.label.rfind(" ("));
+  const std::string label = words_of_key(key).label;
   error.key = key + " error_percent";
-  error.label = fmt::format("Error of {}{} (%)", std::tolower(label.front()) == 'h' ? "" : "the ",
-                            label.starts_with("Hausdorff")
-                                ? label
-                                : std::string(1, static_cast<char>(std::tolower(label.front()))) + label.substr(1));
+  error.label = fmt::format("Error of {}{} (%)", label.starts_with("Hausdorff") || label.empty() ? "" : "the ",
+                            label.empty() ? key : label);
   for (Numbers& numbers : error.values) {
     for (auto& number : numbers) {
       if (number) {
@@ -138,20 +216,50 @@ Coordinate key_against_reference(const std::vector<Report>& reports, const std::
   return error;
 }
 
+// The content of the surface to which a run's shells are held; empty where it names none.
+std::string target_of(const Report& report) {
+  const auto member = [](const Json& object, const char* key) {
+    return object.is_object() ? object.value(key, Json()) : Json();
+  };
+  const Json arguments = member(report.json, "arguments");
+  const Json named =
+      member(arguments, "TARGET").is_null() ? member(arguments, "--target") : member(arguments, "TARGET");
+  const Json inputs = member(report.json, "inputs");
+  for (const Json& input : inputs.is_array() ? inputs : Json::array()) {
+    const Json hash = member(input, "sha256");
+    if (named.is_string() && member(input, "path") == named && hash.is_string()) {
+      return hash.get<std::string>();
+    }
+  }
+  return {};
+}
+
+// Runs held to other surfaces, as of a cohort's patients, are neither better nor worse than each other.
+bool are_of_one_problem(const std::vector<Report>& reports) {
+  std::set<std::string> targets;
+  std::ranges::transform(reports, std::inserter(targets, targets.end()), target_of);
+  return targets.size() == 1 || targets.contains("");
+}
+
 void warn_of_other_inputs(const std::vector<Report>& reports, const Report& reference, std::vector<Warning>& warnings) {
   std::string first;
   std::size_t count = 0;
   for (const Report& report : reports) {
-    if (const std::vector<std::string> other = stated_otherwise(report, reference); !other.empty() && count++ == 0) {
+    std::vector<std::string> other = stated_otherwise(report, reference);
+    if (!are_of_one_problem({report, reference})) {
+      other.emplace_back("another target");
+    }
+    if (!other.empty() && count++ == 0) {
       first = fmt::format("{} ({})", report.path.string(), fmt::join(other, "; "));
     }
   }
   if (count > 0) {
-    warnings.push_back({Weight::major, "other inputs",
-                        fmt::format("{} of {} runs state another wall, load or support than the reference, the first "
-                                    "{}: how far they differ is no error of theirs; give a reference of the same "
-                                    "inputs",
-                                    count, reports.size(), first)});
+    warnings.push_back(
+        {Weight::major, "other inputs",
+         fmt::format("{} of {} runs are of another target, wall, load or support than the reference, the first "
+                     "{}: how far they differ is no error of theirs; give a reference of the same "
+                     "inputs",
+                     count, reports.size(), first)});
   }
 }
 
@@ -381,6 +489,7 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vect
   }
 
   chart.guide = options.guide;
+  chart.of_one_problem = options.reference || are_of_one_problem(reports);
   made.marks = rows.size();
   made.failures = failures.size();
   const auto front = pareto_front(chart);
@@ -406,84 +515,12 @@ ReportChart chart_of_reports(const std::vector<Report>& reports, const std::vect
 }
 
 std::string describe_key(const std::string& key) {
-  static const std::map<std::string, std::string> units{
-      {"percent", "%"}, {"mm", "mm"},   {"mm2", "mm²"},      {"mm3", "mm³"}, {"deg", "°"},
-      {"mj", "mJ"},     {"hz", "Hz"},   {"s", "s"},          {"rad", "rad"}, {"mib", "MiB"},
-      {"ms", "ms"},     {"mpa", "MPa"}, {"n_per_mm", "N/mm"}};
-  std::vector<std::string> parts;
-  for (std::size_t start = 0; start <= key.size();) {
-    const std::size_t dot = std::min(key.find('.', start), key.size());
-    parts.push_back(key.substr(start, dot - start));
-    start = dot + 1;
-  }
-  std::string unit;
-  std::vector<std::string> words;
-  bool distance = false;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    std::string part = parts[i];
-    if (i + 1 < parts.size() && (part == "result" || part == "iterations" || part == "probes" || part == "study")) {
-      continue;
-    }
-    if (part == "*" || (!part.empty() && part.find_first_not_of("0123456789-") == std::string::npos)) {
-      continue;
-    }
-    if (part == "seconds") {
-      unit = "s";
-      words.emplace_back(i + 1 < parts.size() && parts[i + 1] == "total" ? "total time" : "time");
-      if (i + 1 < parts.size()) {
-        if (parts[i + 1] != "total") {
-          words.back() += " to " + parts[i + 1];
-        }
-        ++i;
-      }
-      continue;
-    }
-    if (part == "ms_per_step") {
-      unit = "ms";
-      words.emplace_back("time per step");
-      continue;
-    }
-    if (const auto found = units.find(part); found != units.end() && i > 0) {
-      unit = found->second;
-      continue;
-    }
-    for (std::size_t at = part.find('_'); at != std::string::npos; at = part.find('_', at + 1)) {
-      if (const auto found = units.find(part.substr(at + 1)); found != units.end()) {
-        unit = found->second;
-        part.resize(at);
-        break;
-      }
-    }
-    distance = distance || part.find("hausdorff") != std::string::npos || part.find("one_sided") != std::string::npos ||
-               part == "mean" || part == "rms";
-    part = part == "hausdorff"        ? "Hausdorff distance"
-           : part == "flat_hausdorff" ? "Hausdorff distance of the flat facets"
-           : part == "one_sided"      ? "one-sided distance"
-           : part == "mean"           ? "mean distance"
-           : part == "rms"            ? "root mean square distance"
-           : part == "upper"          ? "upper bound"
-           : part == "lower"          ? "lower bound"
-           : part == "dof"            ? "degrees of freedom"
-           : part == "estimate"       ? "estimated error"
-           : part == "estimates"      ? "estimated error"
-           : part == "membrane_p99"   ? "membrane stress p99"
-           : part == "peak"           ? "peak memory"
-           : part == "triangles_in"   ? "triangles before"
-                                      : part;
-    std::ranges::replace(part, '_', ' ');
-    words.push_back(part);
-  }
-  std::string label = fmt::format("{}", fmt::join(words, ", "));
+  auto [label, unit] = words_of_key(key);
   if (label.empty()) {
     return key;
   }
-  if (label.front() >= 'a' && label.front() <= 'z') {
-    label.front() = static_cast<char>(label.front() - 'a' + 'A');
-  }
-  if (!unit.empty()) {
-    label += fmt::format(" ({})", unit == "%" && distance ? "% of the diagonal" : unit);
-  }
-  return label;
+  label.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(label.front())));
+  return unit.empty() ? label : fmt::format("{} ({})", label, unit);
 }
 
 }  // namespace tunica

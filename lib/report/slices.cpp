@@ -8,7 +8,7 @@
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/volume/label_names.hpp"
 #include "tunica/io/volume/volume_file.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 #include "tunica/report/detail/measures.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/volume/labels/mask.hpp"
@@ -33,15 +33,15 @@ struct Image {
   bool grey = false;  ///< a grey image at an isovalue, not labels
 };
 
-std::optional<std::size_t> count_in(const std::vector<std::string>& words, const char* flag) {
-  const auto text = flag_value(words, flag);
+std::optional<std::size_t> count_in(const PipelineCase& one, const char* flag) {
+  const auto text = argument(one, "extract", flag);
   const auto value = text ? parse_number(*text) : std::nullopt;
   return value && *value >= 0 && *value < 1e9 ? std::optional(truncated<std::size_t>(*value)) : std::nullopt;
 }
 
-// The rules by which the extraction chose, as its command says: that of one of them is enough.
-std::vector<Inside> rules_of(const std::vector<std::string>& words, const Volume& volume) {
-  if (const auto text = flag_value(words, "--label")) {
+// The rules by which the extraction chose: that of one of them is enough.
+std::vector<Inside> rules_of(const PipelineCase& one, const Volume& volume) {
+  if (const auto text = argument(one, "extract", "--label")) {
     std::vector<Inside> rules;
     if (const auto whole = find_label(volume.label_names, *text)) {
       return {Inside{Inside::Rule::label, *whole}};
@@ -55,15 +55,14 @@ std::vector<Inside> rules_of(const std::vector<std::string>& words, const Volume
     }
     return rules;
   }
-  const auto level = flag_value(words, "--isovalue");
+  const auto level = argument(one, "extract", "--isovalue");
   const auto value = level ? parse_number(*level) : std::nullopt;
-  const bool below = flag_value(words, "--inside") == "below";
+  const bool below = argument(one, "extract", "--inside") == "below";
   return value ? std::vector{Inside{below ? Inside::Rule::below : Inside::Rule::above, *value}} : std::vector<Inside>{};
 }
 
 // Errors: InputError that says why the volume cannot be shown.
 Image read_image(const PipelineCase& one) {
-  const auto words = words_of(one, "extract");
   const std::vector<ReportedFile> inputs = one.files("extract", "inputs");
   if (inputs.empty() || inputs.front().path.empty()) {
     throw InputError("no slices: the report of the extraction names no volume");
@@ -73,14 +72,14 @@ Image read_image(const PipelineCase& one) {
     throw InputError(path.string() + ": is not the volume that was extracted any more: no slices of it are shown");
   }
   VolumeOptions options;
-  options.frame = count_in(words, "--frame");
-  options.layer = count_in(words, "--layer");
-  options.prefer_qform = std::ranges::find(words, "--prefer-qform") != words.end();
-  options.segment = flag_value(words, "--names") ? std::nullopt : flag_value(words, "--label");
+  options.frame = count_in(one, "--frame");
+  options.layer = count_in(one, "--layer");
+  options.prefer_qform = arguments_of(one, "extract").contains("--prefer-qform");
+  options.segment = argument(one, "extract", "--names") ? std::nullopt : argument(one, "extract", "--label");
   Volume volume = read_volume(path, options).volume;
-  const std::vector<Inside> rules = rules_of(words, volume);
+  const std::vector<Inside> rules = rules_of(one, volume);
   if (rules.empty()) {
-    throw InputError("no slices: what the command of the extraction names is no label of the volume, nor an isovalue");
+    throw InputError("no slices: what the extraction was given is no label of the volume, nor an isovalue");
   }
   Mask organ = select(volume, rules.front());
   for (const Inside& rule : rules | std::views::drop(1)) {

@@ -2,7 +2,7 @@
 
 #include "tunica/core/error.hpp"
 #include "tunica/io/file/output_file.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 
 #include <fmt/format.h>
 
@@ -58,8 +58,7 @@ std::set<std::string> contents_of(const fs::path& folder) {
 }
 
 bool names_files(const PipelineCase& one, const std::string& stage) {
-  const auto words = words_of(one, stage);
-  return std::ranges::find(words, "--no-paths") == words.end();
+  return !arguments_of(one, stage).contains("--no-paths");
 }
 
 std::string report_file(const PipelineCase& one, const std::string& stage) {
@@ -113,6 +112,11 @@ void compare_folder(const PipelineCase& one, const std::string& stage, const Cas
 
 // Whether a stage read what the stages before it wrote: a chain may be mixed from the files of two cases or of two
 // runs.
+std::string another_run(const PipelineCase& one, const std::string& stage, const std::string& before) {
+  return fmt::format("{}: {} read another {} than {} wrote: the files are of two runs, run the case again",
+                     report_file(one, stage), stage, stages().at(before).files.front(), before);
+}
+
 void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& found) {
   const auto inputs = one.files(stage, "inputs");
   const auto hashed = [](const ReportedFile& file) { return !file.sha256.empty(); };
@@ -123,8 +127,18 @@ void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& 
     const auto outputs = one.files(before, "outputs");
     if (!outputs.empty() && hashed(outputs.front()) &&
         std::ranges::find(inputs, outputs.front().sha256, &ReportedFile::sha256) == inputs.end()) {
-      found.push_back(fmt::format("{}: {} read another {} than {} wrote: the files are of two runs, run the case again",
-                                  report_file(one, stage), stage, stages().at(before).files.front(), before));
+      found.push_back(another_run(one, stage, before));
+    }
+  }
+  // What a stage may read besides, such as the surface that its shells were fitted to.
+  for (const char* before : pipeline_stages) {
+    const auto outputs = one.files(before, "outputs");
+    if (before != stage && !outputs.empty() && hashed(outputs.front()) &&
+        std::ranges::any_of(inputs, [&](const ReportedFile& file) {
+          return hashed(file) && !file.path.empty() && file.path == outputs.front().path &&
+                 file.sha256 != outputs.front().sha256;
+        })) {
+      found.push_back(another_run(one, stage, before));
     }
   }
 }

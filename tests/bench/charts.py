@@ -109,13 +109,21 @@ class Study:
         """A mark of a chart. @return its file"""
         path = self.folder / "marks" / chart / f"{name.replace('/', '-')}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({**record, "setting": setting, "study": {**record["study"], **study}}),
+        path.write_text(json.dumps({**record, "study": {**record["study"], **study, series_of(chart): setting}}),
                         encoding="utf-8")
         return str(path.relative_to(self.folder))
 
     def draw(self, name, title, marks, *options):
         run_tool("chart", *marks, "-o", self.out / f"{name}.svg", "--csv", self.out / f"{name}.csv", "--force", "--quiet",
-                 "--series", "setting", "--title", title, *options, folder=self.folder)
+                 "--series", f"study.{series_of(name)}", "--title", title, *options, folder=self.folder)
+
+
+def series_of(chart):
+    """What the series of a chart are, the head of its legend."""
+    named = {"elements": "elements", "estimates": "answer_and_level", "figure-6": "element_and_solver", "load-steps": "method",
+             "organ": "mesh_and_elements", "profile": "mesh_and_elements", "requested": "answer", "shape": "method",
+             "sizes": "solver", "solvers": "solver", "time-steps": "integrator", "certificate": "surface"}
+    return next(series for start, series in named.items() if chart.startswith(start))
 
 
 def key_of(setting):

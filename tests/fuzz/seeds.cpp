@@ -192,7 +192,6 @@ void pages(const Seeds& seeds) {
   DrawnResult drawn;
   drawn.reference = drawn.solids = {ball.vertices, ball.triangles};
   drawn.shells = ball.triangles.size();
-  drawn.scene = "[run]\nkind = \"static\"\n";
   const std::size_t points = ball.vertices.size();
   for (const double time : {0.0, 0.5, 1.0}) {
     drawn.states.push_back({drawn.states.size(), time, time, std::vector<Vec3>(points, Vec3(time, 0, 0)),

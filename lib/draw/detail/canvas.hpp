@@ -31,9 +31,6 @@ public:
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  /// From the beginning of the text to where the next one would begin. @param size  of the font
-  [[nodiscard]] double text_width(const std::string& text, double size) const;
-
   /// (x, y) is on the base line, at the left, in the middle or at the right end.
   void text(const std::string& text, double x, double y, double size, const Colour& colour, Align align = Align::left);
 

@@ -12,7 +12,7 @@ std::string printable(const std::string& text);
 /// The same with the signs of XML escaped.
 std::string safe(const std::string& text);
 
-/// Pixels, from the widths of a sans-serif font; a little generous, the reader's font is unknown.
+/// From the beginning of the text to where the next one would begin, in the font of pictures. Pixels.
 double text_width(const std::string& text, double size);
 
 /// Cuts the middle out of a text that is longer than `most` characters.

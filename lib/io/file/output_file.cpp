@@ -76,7 +76,7 @@ void require_writable(const fs::path& path, bool overwrite) {
   struct stat there {};
   for (const auto& [place, facts] : {std::pair(folder, &here), std::pair(target, &there)}) {
     if (!fs::is_directory(place, error) || ::stat(place.c_str(), facts) != 0) {
-      throw OutputError(fmt::format("{}: the folder {} does not exist", path.string(), place.string()));
+      throw OutputError(fmt::format("{}: the folder that it is to be in does not exist", path.string()));
     }
     if (::access(place.c_str(), W_OK) != 0) {
       throw OutputError(

@@ -367,16 +367,48 @@ ReferenceError error_against(const Report& run, const Report& reference) {
                   run.path.string(), reference.path.string()));
 }
 
+namespace {
+
+Json value_at(const Json& object, const char* key) { return object.is_object() ? object.value(key, Json()) : Json(); }
+
+// Tables of a scene without what belongs to a body's name or mesh: those of another resolution differ.
+Json without_mesh(Json tables) {
+  for (Json& table : tables) {
+    if (table.is_object()) {
+      table.erase("body");
+      if (value_at(value_at(table, "where"), "nodes").is_array()) {
+        table.erase("where");
+      }
+    }
+  }
+  return tables;
+}
+
+}  // namespace
+
 std::vector<std::string> stated_otherwise(const Report& run, const Report& reference) {
   std::vector<std::string> found;
   const auto stated = [](const Report& report) { return report.json.value("stated", Json::object()); };
   const Json own = stated(run);
   const Json other = stated(reference);
+  const auto compare = [&](const std::string& what, const Json& value, const Json& truth) {
+    const auto shown = [](const Json& one) { return one.dump(-1, ' ', false, Json::error_handler_t::replace); };
+    if (value != truth) {
+      found.push_back(fmt::format("{} {}, {} in the reference", what, shown(value), shown(truth)));
+    }
+  };
   for (const char* key : {"young_mpa", "poisson", "thickness_mm", "density_kg_per_m3", "pressure_mpa", "imaged_at_mpa",
                           "law", "support", "fix"}) {
-    if (own.is_object() && other.is_object() && own.contains(key) && other.contains(key) && own[key] != other[key]) {
-      const auto shown = [&](const Json& value) { return value.dump(-1, ' ', false, Json::error_handler_t::replace); };
-      found.push_back(fmt::format("{} {}, {} in the reference", key, shown(own[key]), shown(other[key])));
+    if (own.is_object() && other.is_object() && own.contains(key) && other.contains(key)) {
+      compare(key, own[key], other[key]);
+    }
+  }
+  const Json tables = value_at(own, "scene");
+  const Json other_tables = value_at(other, "scene");
+  for (const char* section : {"fix", "support", "load"}) {
+    if (found.empty() && tables.is_object() && other_tables.is_object()) {
+      compare(fmt::format("[[{}]]", section), without_mesh(value_at(tables, section)),
+              without_mesh(value_at(other_tables, section)));
     }
   }
   return found;

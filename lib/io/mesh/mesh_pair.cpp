@@ -17,9 +17,9 @@ namespace tunica {
 namespace {
 
 constexpr std::array<std::string_view, 4> units{"um", "mm", "cm", "m"};
-constexpr double slack = 1.25;        // a coarse mesh may be smaller than what it stands for
-constexpr double never_meant = 500;   // half of the ratio of neighbouring prefixes, whatever the shapes
-constexpr double diagonals_away = 1;  // as much as the whole thing: it lies somewhere else
+constexpr double slack = 1.25;              // a coarse mesh may be smaller than what it stands for
+constexpr double largest_unit_ratio = 500;  // half of the ratio of neighbouring prefixes, whatever the shapes
+constexpr double diagonals_away = 1;        // as much as the whole thing: it lies somewhere else
 
 bool about(double value, double expected) { return value < slack * expected && value > expected / slack; }
 
@@ -90,7 +90,7 @@ void require_same_scale(const MeshFile& a, const std::filesystem::path& path_a, 
   const double ratio = ratio_of_units(factor);
   const bool wrong_unit =
       ratio > 1 && about(factor, ratio) && (a_to_b > 1 ? similar(box_a, box_b, factor) : similar(box_b, box_a, factor));
-  if (!wrong_unit && factor < never_meant) {
+  if (!wrong_unit && factor < largest_unit_ratio) {
     return;
   }
   const auto of_a = likely_unit(a, unit_mm, a_to_b);

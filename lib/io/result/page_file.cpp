@@ -168,9 +168,8 @@ void write_page_file(const std::filesystem::path& path, const DrawnResult& drawn
                     {"triangles", drawn.reference.triangles.size()},
                     {"solid_points", drawn.solids.vertices.size()},
                     {"solid_triangles", drawn.solids.triangles.size()},
-                    {"states", states},
-                    {"scene", drawn.scene}};
-  // A path in a scene need not be UTF-8.
+                    {"states", states}};
+  // A path in the command need not be UTF-8.
   std::string bytes = header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
   put(bytes, drawn.reference);
   put(bytes, drawn.solids);
@@ -187,12 +186,11 @@ DrawnResult read_page_file(const std::filesystem::path& path) {
   Reader reader(path);
   DrawnResult drawn;
   reader.require(reader.at("kind").is_string() && reader.at("is_unloaded").is_boolean() &&
-                 reader.at("scene").is_string() && reader.at("states").is_array() && !reader.at("states").empty());
+                 reader.at("states").is_array() && !reader.at("states").empty());
   const auto* const kind = std::ranges::find(kinds, reader.at("kind").get<std::string>());
   reader.require(kind != kinds.end());
   drawn.kind = static_cast<DrawnResult::Kind>(kind - kinds.begin());
   drawn.is_unloaded = reader.at("is_unloaded").get<bool>();
-  drawn.scene = reader.at("scene").get<std::string>();
   drawn.shells = reader.count(reader.at("shells"));
   drawn.pieces = reader.count(reader.at("pieces"));
   const std::size_t points = reader.count(reader.at("points"));

@@ -32,7 +32,6 @@ struct DrawnResult {
   std::vector<State> states;  ///< at least one; of many so many evenly chosen, the first and the last among them
   Kind kind = Kind::statics;
   bool is_unloaded = false;  ///< the reference is not what was imaged, but the shape without the pressure of then
-  std::string scene;         ///< resolved, SI, TOML
   std::string made_by{};     ///< program and command, for who looks into the file; not read
 };
 

@@ -181,16 +181,16 @@ constexpr std::array about{
     About{"tunica/history/newton_iterations", "1", "linear systems of the step"},
     About{"tunica/history/cg_iterations", "1", "iterations of conjugate gradients in the step"},
     About{"tunica/history/max_displacement", "mm", "largest of the curved surfaces"},
-    About{"tunica/history/displacement_p99", "mm", "passed on 1 % of the shells' area"},
+    About{"tunica/history/displacement_p99", "mm", "exceeded on 1 % of the shells' area"},
     About{"tunica/history/membrane_p99", "MPa",
-          "von Mises stress of the mean over the wall, passed on 1 % of the area"},
+          "von Mises stress of the mean over the wall, exceeded on 1 % of the area"},
     About{"tunica/history/membrane_max", "MPa", "largest von Mises stress of the mean over the wall"},
     About{"tunica/history/membrane_mean", "MPa", "von Mises stress of the mean over the wall, mean over the area"},
-    About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, passed on 1 % of the area"},
-    About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, passed on 1 % of the area"},
+    About{"tunica/history/tension_p99", "N/mm", "largest principal membrane force, exceeded on 1 % of the area"},
+    About{"tunica/history/stress_p99", "MPa", "von Mises stress of either face, exceeded on 1 % of the area"},
     About{"tunica/history/stress_max", "MPa", "largest von Mises stress of either face"},
     About{"tunica/history/stress_max_at", "mm", "where it is, reference"},
-    About{"tunica/history/strain_p99", "%", "largest principal strain of either face, passed on 1 % of the area"},
+    About{"tunica/history/strain_p99", "%", "largest principal strain of either face, exceeded on 1 % of the area"},
     About{"tunica/history/strain_max", "%", "largest principal strain of either face"}};
 
 // Of the shells' fields, in CellData and in tunica/elements.
@@ -703,7 +703,6 @@ void ResultFile::commit(bool converged) {
   const ResultOptions& about = implementation_->about_run;
   drawn.kind = static_cast<DrawnResult::Kind>(about.run.kind.index());
   drawn.is_unloaded = about.is_unloaded;
-  drawn.scene = about.scene;
   drawn.made_by = fmt::format("tunica {}: {}", version, about.command);
   write_page_file(page_path(implementation_->name), drawn, about.overwrite);
   implementation_->output.commit();

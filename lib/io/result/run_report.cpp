@@ -350,10 +350,11 @@ std::vector<Warning> prestress_warnings(const RunRecord& record) {
   }
   return {
       {Weight::major, "unstable image",
-       "a wall of this stiffness and thickness cannot rest in the shape of the image under the pressure of then: "
-       "some dent snaps to another shape by itself, so that under any other pressure displacements are that jump "
-       "and stresses those after it; the stress in the shape of the image is in balance, no more: smooth the surface "
-       "(SMOOTH), take a stiffer or thicker wall, or put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)"}};
+       "under the pressure of the image a wall of this stiffness and thickness is not stable in the shape of the "
+       "image: "
+       "a dent would snap out by itself. The stress in that shape balances the pressure and holds. Displacements, and "
+       "stresses under another pressure, are those after the snap: smooth the surface (SMOOTH), take a stiffer or "
+       "thicker wall, or put it into a bed (--support 1e5N/m3, SUPPORT=1e5N/m3)"}};
 }
 
 std::vector<Warning> unloaded_warnings(const Unloaded& unloaded) {
@@ -441,8 +442,9 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
   const AccuracyRequest& request = accuracy.request;
   std::vector<std::string> lines;
   if (accuracy.estimate && accuracy.reasons.empty()) {
-    lines.push_back(fmt::format("the error of the {} is credibly below {:.2g} % of it ({:.2g} % asked for)",
-                                name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));
+    lines.push_back(fmt::format(
+        "the error of the {} is estimated to be below {:.2g} % of it, from levels that agree ({:.2g} % asked for)",
+        name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));
   }
   for_each_notable(accuracy.estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
     if (answer.of != request.of) {
@@ -540,8 +542,8 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, 
     warnings.push_back(
         {Weight::minor, "long steps",
          fmt::format(
-             "time integration took {:.3g} % of the energy: what swings is smaller than it should be, the state "
-             "of rest is not: for the motion take shorter steps, or {}",
+             "time integration took {:.3g} % of the energy: the amplitudes of the motion are too small, the state of "
+             "rest is right. For the motion take shorter steps, or {}",
              1e2 * energy.lost / energy.largest,
              integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\""
                                                       : "a larger spectral_radius")});
@@ -595,16 +597,16 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
   if (summary.largest_bend > notable_bend * summary.largest_motion) {
     warnings.push_back(
         {Weight::minor, "long steps",
-         fmt::format("the steps are long for what swings: from one to the next the motion bends by {} of its "
-                     "largest value: take shorter ones, or error control (adaptive)",
+         fmt::format("the steps are long for this motion: between two of them it departs from a straight line by {} "
+                     "of its largest value: take shorter ones, or error control (adaptive)",
                      percent_text(summary.largest_bend / summary.largest_motion))});
   }
   if (summary.stiffened_from) {
     warnings.push_back(
         {Weight::major, "coarse shells",
-         fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on, where it "
-                     "would have buckled in waves as short as its elements, these were made stiff; whether the shell "
-                     "itself buckles this mesh does not resolve: refine it",
+         fmt::format("the mesh is coarse for so thin a curved shell (h^2 > 3 R t): from {} {:.4g} on it would "
+                     "have buckled edge by edge, so its elements were stiffened; whether the wall itself buckles this "
+                     "mesh does not show: refine it",
                      std::holds_alternative<DynamicRun>(run.kind) ? "second" : "load factor",
                      *summary.stiffened_from)});
   }

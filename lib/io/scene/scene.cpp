@@ -158,8 +158,8 @@ std::size_t body_index(const Scene& scene, const std::string& name, const Places
     return narrow<std::size_t>(found - names.begin());
   }
   places.of(key).require(!rigid_index(scene, name),
-                         fmt::format("\"{}\" is rigid and moves as it is told: the bodies that deform are \"{}\"", name,
-                                     fmt::join(names, "\", \"")));
+                         fmt::format("\"{}\" is rigid and moves by its own motion: the bodies that deform are \"{}\"",
+                                     name, fmt::join(names, "\", \"")));
   places.of(key).fail(fmt::format("there is no body \"{}\": the bodies are \"{}\"", name, fmt::join(names, "\", \"")));
 }
 
@@ -288,11 +288,11 @@ void warn_of_small_region(const Model& model, std::size_t body, const std::vecto
     touched += shares[t] > 0 ? area : 0;
   }
   if (inside < small * touched) {
-    warnings.push_back({Weight::minor, "small region",
-                        fmt::format("{}: the region is small beside the shells: its force is right, but spread over "
-                                    "shells of {:.2g} times its area; smaller shells there (more of them) place it "
-                                    "better",
-                                    place, touched / inside)});
+    warnings.push_back(
+        {Weight::minor, "small region",
+         fmt::format("{}: the region is small beside the shells: what acts there is spread over shells of "
+                     "{:.2g} times its area; smaller shells there (more of them) place it better",
+                     place, touched / inside)});
   }
 }
 
@@ -336,11 +336,13 @@ LoadedScene load_scene(const Scene& scene) {
   LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings),
                      found.space};
   warn_of_far_points(scene, loaded.model, loaded.warnings);
-  for (const Support& support : loaded.model.supports) {
+  // The levels of an accuracy place a region better and better, and say by how much its area still changes.
+  for (std::size_t i = 0; !scene.accuracy && i < loaded.model.supports.size(); ++i) {
+    const Support& support = loaded.model.supports[i];
     warn_of_small_region(loaded.model, support.body, support.shares, support.said_at, loaded.warnings);
   }
   for (const Load& load : loaded.model.loads) {
-    if (const auto* const pressure = std::get_if<PressureLoad>(&load.kind)) {
+    if (const auto* const pressure = std::get_if<PressureLoad>(&load.kind); pressure != nullptr && !scene.accuracy) {
       warn_of_small_region(loaded.model, load.body, pressure->shares, load.said_at, loaded.warnings);
     }
   }

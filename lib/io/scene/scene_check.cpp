@@ -215,7 +215,7 @@ std::pair<std::size_t, std::size_t> bodies_of(const Scene& scene, const SceneAtt
   for (const auto& [key, name] : {std::pair("body", &attach.body), std::pair("to", &attach.to)}) {
     attach.places.of(key).require(!rigid_index(scene, *name),
                                   fmt::format("\"{}\" is rigid: only bodies that deform are attached to each other; "
-                                              "nodes that move as told are a [[fix]] with displacement",
+                                              "nodes with a prescribed motion are a [[fix]] with displacement",
                                               *name));
   }
   return {body_index(scene, attach.body, attach.places, "body"), body_index(scene, attach.to, attach.places, "to")};

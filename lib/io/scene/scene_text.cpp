@@ -3,25 +3,27 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <iterator>
+
 namespace tunica {
+
+std::vector<std::string> lines_of(const WrittenKeys& written) {
+  std::vector<std::string> lines;
+  std::ranges::transform(written, std::back_inserter(lines),
+                         [](const auto& key) { return fmt::format("{} = {}", key.first, key.second); });
+  return lines;
+}
 
 std::string scene_text(const Scene& scene, const std::filesystem::path& file) {
   const std::filesystem::path folder =
       file.empty() ? file : std::filesystem::absolute(file).lexically_normal().parent_path();
-  const Writing to{&scene, folder};
   std::string text;
-  const auto write = [&](const std::string& header, const auto& keys, const auto& item) {
-    text += fmt::format("{}{}\n{}\n", text.empty() ? "" : "\n", header, fmt::join(written_keys(keys, item, to), "\n"));
-  };
-  write("[run]", scene_schema().run, scene);
-  for_each_section(scene, [&](std::string_view section, const auto& keys, const auto& items) {
-    for (const auto& item : items) {
-      write(fmt::format("[[{}]]", section), keys, item);
-    }
+  for_each_written_table(scene, folder, [&](std::string_view section, bool repeated, const WrittenKeys& keys) {
+    const std::string header = fmt::format("[{}]", section);
+    text += fmt::format("{}{}\n{}\n", text.empty() ? "" : "\n", repeated ? "[" + header + "]" : header,
+                        fmt::join(lines_of(keys), "\n"));
   });
-  if (scene.accuracy) {
-    write("[accuracy]", scene_schema().accuracy, *scene.accuracy);
-  }
   return text;
 }
 

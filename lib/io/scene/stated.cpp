@@ -1,10 +1,13 @@
 #include "tunica/io/scene/stated.hpp"
 
+#include "tunica/io/scene/detail/schema.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <cctype>
 #include <set>
+#include <sstream>
 #include <string>
 
 namespace tunica {
@@ -48,16 +51,46 @@ struct NameOfRegion {
     return fmt::format("{} {}={:g}mm", half.below ? "below" : "above", "xyz"[half.axis], half.at);
   }
   std::string operator()(const SphereNodes&) const { return "a sphere"; }
-  std::string operator()(const ListedNodes& list) const { return fmt::format("{} nodes", list.nodes.size()); }
+  std::string operator()(const ListedNodes& list) const {
+    return fmt::format("{} node{}", list.nodes.size(), list.nodes.size() == 1 ? "" : "s");
+  }
   std::string operator()(const NearestNode&) const { return "a node"; }
   std::string operator()(const TouchingNodes&) const { return "what touches"; }
 };
+
+// A value as a scene file has it.
+Json json_of(const std::string& value) {
+  try {
+    std::ostringstream text;
+    text << toml::json_formatter(toml::parse("value = " + value));
+    return Json::parse(text.str()).at("value");
+  } catch (const toml::parse_error&) {  // a name of a file need not be UTF-8
+    return value;
+  }
+}
+
+// The whole scene as resolved, by section.
+Json tables_of(const Scene& scene) {
+  Json tables = Json::object();
+  for_each_written_table(scene, {}, [&](std::string_view section, bool repeated, const WrittenKeys& keys) {
+    Json table = Json::object();
+    for (const auto& [key, value] : keys) {
+      table[std::string(key)] = json_of(value);
+    }
+    Json& place = tables[std::string(section)];
+    repeated ? place.push_back(std::move(table)) : place.update(table);
+  });
+  return tables;
+}
 
 // What is held, with its body where there are several.
 std::string text_of(const SceneFix& fix, bool alone) {
   const std::string& written = fix.places.item.typed;
   const std::string region = written.empty() ? std::visit(NameOfRegion(), fix.where) : written;
-  const std::string held = written.empty() && fix.slide ? region + ":slide" : region;
+  std::string held = written.empty() && fix.slide ? region + ":slide" : region;
+  if (const auto& moved = fix.displacement) {
+    held += fmt::format(", moved by ({:g}, {:g}, {:g}) mm", moved->x(), moved->y(), moved->z());
+  }
   return alone ? held : fmt::format("{}: {}", fix.body, held);
 }
 
@@ -94,8 +127,12 @@ Json stated_inputs(const Scene& scene) {
       common(pressures, [&](const SceneLoad& load) { return known_or_null(of_pressure(load).imaged_at); });
   stated["law"] = scene.shells.empty() ? Json() : Json("linear");
   stated["support"] = common(scene.supports, [](const SceneSupport& support) {
-    return Json{{"stiffness_n_per_m3", n_per_m3 * support.stiffness},
-                {"direction", support.normal_only ? "normal" : "all"}};
+    Json bed{{"stiffness_n_per_m3", n_per_m3 * support.stiffness},
+             {"direction", support.normal_only ? "normal" : "all"}};
+    if (support.where) {
+      bed["where"] = std::visit(NameOfRegion(), *support.where);
+    }
+    return bed;
   });
   stated["membrane"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.membrane)); });
   stated["bending"] = of_shells([](const SceneShell& shell) { return Json(name_of(shell.bending)); });
@@ -105,6 +142,17 @@ Json stated_inputs(const Scene& scene) {
   for (const SceneFix& fix : scene.fixes) {
     stated["fix"].push_back(text_of(fix, alone));
   }
+  stated["loads"] = Json::array();
+  for (const SceneLoad& load : scene.loads) {
+    const std::string region = load.where ? std::visit(NameOfRegion(), *load.where) : "";
+    Json& told = stated["loads"].emplace_back(Json{{"kind", name_of(load.kind)}});
+    told["where"] = region.empty() ? Json() : Json(region);
+    if (const auto* pressure = std::get_if<PressureLoad>(&load.kind)) {
+      told["follower"] = pressure->follower;
+    }
+    told["ramped"] = !load.ramp.points.empty();
+  }
+  stated["scene"] = tables_of(scene);
   Json& written = stated["typed"] = Json::object();
   for (const char* key : {"young", "thickness", "density"}) {
     written[key] = of_shells([&](const SceneShell& shell) { return typed(shell.places, key); });
@@ -131,7 +179,8 @@ std::string stated_line(const Scene& scene) {
       pressures.insert(typed_text(load.places, "value"));
       imaged.insert(typed_text(load.places, "imaged_at"));
     } else {
-      others.emplace(name_of(load.kind));
+      const std::string value = typed_text(load.places, "value");
+      others.insert(std::string(name_of(load.kind)) + (value.empty() ? "" : " " + value));
     }
   }
   say("pressure", pressures);

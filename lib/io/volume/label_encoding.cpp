@@ -123,8 +123,8 @@ std::string to_utf8(const std::filesystem::path& path, std::string bytes) {
   }
   if (bytes.find('\0') != std::string::npos) {
     throw InputError(
-        fmt::format("{}: holds binary data, or text in an encoding that is not told by a byte order mark: no table of "
-                    "labels does; save it as UTF-8",
+        fmt::format("{}: holds binary data, or text in an encoding without a byte order mark, which no table of labels "
+                    "can be: save it as UTF-8",
                     path.string()));
   }
   return bytes;

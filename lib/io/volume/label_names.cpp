@@ -333,9 +333,10 @@ std::optional<double> find_label(const LabelNames& names, const std::string& tex
     const std::size_t digits = text.find_first_not_of("+-0");
     const bool whole = digits != std::string::npos && text.find_first_not_of("0123456789", digits) == std::string::npos;
     if (!std::isfinite(*value) || (whole && fmt::format("{:.0f}", std::abs(*value)) != text.substr(digits))) {
-      throw InputError(fmt::format(
-          "the label {} cannot be told from its neighbours, as few above 2^53 can: give the labels smaller numbers",
-          shown(text)));
+      throw InputError(
+          fmt::format("the label {} and its neighbours become the same number, as most above 2^53 do: give the labels "
+                      "smaller numbers",
+                      shown(text)));
     }
     return value;
   }

@@ -48,8 +48,8 @@ void begin(void* data, const XML_Char* element, const XML_Char** attributes) {
 
 void text_of(void* data, const XML_Char* text, int size) {
   Reading& reading = *static_cast<Reading*>(data);
-  constexpr std::size_t enough = 4096;  // longer than any name that is taken
-  if (reading.key && reading.name.size() < enough) {
+  constexpr std::size_t longest_text = 4096;  // longer than any name that is taken
+  if (reading.key && reading.name.size() < longest_text) {
     reading.name.append(text, narrow<std::size_t>(size));
   }
 }

@@ -9,11 +9,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <ranges>
 
 namespace tunica::volume_format {
 namespace fs = std::filesystem;
@@ -230,24 +233,38 @@ std::vector<std::optional<std::vector<double>>> parse_vectors(const fs::path& pa
   return vectors;
 }
 
-// Signs that turn the file's world axes into left, posterior, superior; none for a space without anatomy.
-std::optional<Vec3> signs_to_lps(std::string space) {
+// What turns the file's world axes into left, posterior, superior; none for a space without anatomy. The format knows
+// three such spaces; others are written in the same way, an initial or a word for each axis, and mean what they say.
+std::optional<Mat3> to_lps(std::string space) {
+  constexpr std::array<std::array<std::string_view, 2>, 3> ends{
+      {{"left", "right"}, {"posterior", "anterior"}, {"superior", "inferior"}}};
   space = lower_case(space);
   if (space.ends_with("-time")) {
     space.resize(space.size() - 5);
   } else if (space.size() == 4 && space.back() == 't') {
     space.pop_back();
   }
-  if (space == "left-posterior-superior" || space == "lps") {
-    return Vec3(1, 1, 1);
+  std::vector<std::string> words;
+  if (space.size() == 3) {
+    for (const char initial : space) {
+      words.emplace_back(1, initial);
+    }
+  } else {
+    for (const auto word : space | std::views::split('-')) {
+      words.emplace_back(word.begin(), word.end());
+    }
   }
-  if (space == "right-anterior-superior" || space == "ras") {
-    return Vec3(-1, -1, 1);
+  Mat3 turn = Mat3::Zero();
+  for (std::size_t axis = 0; axis < words.size() && words.size() == 3; ++axis) {
+    for (std::size_t world = 0; world < 3; ++world) {
+      for (const std::string_view end : ends[world]) {
+        if (words[axis] == end || words[axis] == end.substr(0, 1)) {
+          turn(narrow<Eigen::Index>(world), narrow<Eigen::Index>(axis)) = end == ends[world].front() ? 1 : -1;
+        }
+      }
+    }
   }
-  if (space == "left-anterior-superior" || space == "las") {
-    return Vec3(1, -1, 1);
-  }
-  return {};
+  return std::abs(turn.determinant()) == 1 ? std::optional(turn) : std::nullopt;
 }
 
 std::vector<AxisInfo> parse_axes(const fs::path& path, const Header& header) {
@@ -471,15 +488,18 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
     ++column;
   }
   file.transform = has_directions ? "space directions" : "spacings";
+  const std::string* space = find(header, "space");
+  const auto turn = space != nullptr ? to_lps(*space) : std::nullopt;
+  const bool has_origin = find(header, "spaceorigin") != nullptr;
   if (!has_directions) {
     file.warnings.push_back(
         {Weight::minor, "world transform",
-         fmt::format(
-             "{}: has no space directions: voxels are placed by their {} alone, with axes to the left, back and top",
-             path.string(),
-             unknown == 3   ? "number (spacing 1 mm)"
-             : unknown == 0 ? (origin_of_minima(axes) ? "axis mins and spacings" : "spacings")
-                            : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown))});
+         fmt::format("{}: has no space directions: voxels are placed by their {}{}, with axes {}", path.string(),
+                     unknown == 3   ? "number (spacing 1 mm)"
+                     : unknown == 0 ? (origin_of_minima(axes) ? "axis mins and spacings" : "spacings")
+                                    : fmt::format("spacings ({} of 3 unknown: 1 mm)", unknown),
+                     has_origin ? " and the space origin" : " alone",
+                     turn ? fmt::format("of its space '{}'", shown(*space)) : "to the left, back and top")});
   }
   if (const std::string* text = find(header, "spaceorigin")) {
     const auto vectors = parse_vectors(path, "space origin", *text);
@@ -498,14 +518,14 @@ void set_geometry(VolumeFile& file, const fs::path& path, const Header& header, 
              path.string())});
   }
   affine *= unit_size(path, header, has_directions, file.warnings);
-  const std::string* space = find(header, "space");
-  const auto signs = space != nullptr ? signs_to_lps(*space) : std::nullopt;
-  if (signs) {
-    affine = signs->asDiagonal() * affine;
+  if (turn) {
+    affine = *turn * affine;
   } else if (has_directions) {
-    file.warnings.push_back({Weight::minor, "world transform",
-                             fmt::format("{}: its space '{}' is not tied to the body: taken as left-posterior-superior",
-                                         path.string(), space != nullptr ? shown(*space) : "unnamed")});
+    file.warnings.push_back(
+        {Weight::minor, "world transform",
+         fmt::format("{}: {}: taken as left-posterior-superior", path.string(),
+                     space != nullptr ? fmt::format("its space '{}' is not tied to the body", shown(*space))
+                                      : "names no space")});
   }
   set_affine(file, path, affine);
 }

@@ -13,7 +13,7 @@
 #include <vector>
 
 /// What a scene says, resolved: selections are node lists, quantities are in mm, N, s (MPa, tonne). Nothing here
-/// computes; mechanics/solve.hpp does.
+/// computes; mechanics/runs/solve.hpp does.
 namespace tunica {
 
 enum class Membrane {

@@ -423,7 +423,9 @@ SelectedEdges edges_of(const SelectableBody& body, const Selection& where, const
       fail_empty(body, said_at, "");
     }
     throw InputError(
-        fmt::format("{}: no boundary edge has both its ends among the {} selected nodes", said_at, nodes.size()));
+        body.boundary_edges().empty()
+            ? said_at + ": the body is closed and has no boundary edges: an edge load needs an open one"
+            : fmt::format("{}: no boundary edge has both its ends among the {} selected nodes", said_at, nodes.size()));
   }
   return found;
 }

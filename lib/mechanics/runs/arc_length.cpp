@@ -18,7 +18,7 @@ constexpr double largest_correction = 0.5;
 constexpr double chord_of_factor = 0.002;
 constexpr double chord_of_displacement = 0.005;
 /// A step whose chord departs by this many times more is taken again, shorter.
-constexpr double retried = 6;
+constexpr double retry_limit = 6;
 /// Steps are not cut below this part of the path so far.
 constexpr double smallest_step = 1e-6;
 constexpr std::size_t wanted_iterations = 4;
@@ -233,7 +233,7 @@ private:
       next = PathState();
       if (find(now_, step_, next)) {
         depart = departure(now_, next);
-        if (!(depart > retried)) {
+        if (!(depart > retry_limit)) {
           break;
         }
       }

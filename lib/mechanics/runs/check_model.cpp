@@ -2,6 +2,7 @@
 #include "tunica/core/require.hpp"
 #include "tunica/core/rounding.hpp"
 #include "tunica/mechanics/contact/rigid_shape.hpp"
+#include "tunica/mechanics/runs/detail/places.hpp"
 #include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/run.hpp"
 #include "tunica/mechanics/runs/detail/supports.hpp"
@@ -23,12 +24,8 @@ namespace {
 std::string place(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g}) mm", p.x(), p.y(), p.z()); }
 
 /// What a message begins with.
-std::string called(const std::string& said_at, const std::string& name) {
-  return said_at.empty() ? name : said_at + ": " + name;
-}
-
 [[noreturn]] void refuse(const std::string& said_at, const std::string& name, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", called(said_at, name), what));
+  throw InputError(fmt::format("{}: {}", named(said_at, name), what));
 }
 
 [[noreturn]] void refuse(const ShellBody& body, const std::string& what) { refuse(body.said_at, body.name, what); }
@@ -85,7 +82,7 @@ void check_body(const ShellBody& body) {
   if (mesh.triangles.empty()) {
     refuse(body, "the shell has no triangles");
   }
-  const std::string name = called(body.said_at, body.name);
+  const std::string name = named(body.said_at, body.name);
   check_places(mesh.vertices, name);
   naming(name, [&] {
     if (body.curved) {
@@ -169,7 +166,7 @@ void check_triangles(const ShellBody& body) {
     refuse(body, inconsistent);
   }
   if (body.curved && body.rest == Rest::curved) {
-    require_fit(mesh, called(body.said_at, body.name));
+    require_fit(mesh, named(body.said_at, body.name));
   }
 }
 
@@ -244,7 +241,7 @@ void check_rigid(const RigidBody& body) {
   if (const auto* plane = std::get_if<RigidPlane>(&body.shape)) {
     check_axis(Vec3::Zero(), plane->normal);
   } else if (const auto* mesh = std::get_if<RigidMesh>(&body.shape)) {
-    naming(called(body.said_at, body.name), [&] { require_surface(mesh->surface); });
+    naming(named(body.said_at, body.name), [&] { require_surface(mesh->surface); });
     if (mesh->turn) {
       check_axis(mesh->turn->point, mesh->turn->axis);
     }
@@ -267,7 +264,7 @@ void check_meetings(const Model& model) {
     if (contact.between[0].rigid && contact.between[1].rigid) {
       refuse(contact.said_at, contact.name, "two rigid bodies cannot be in contact");
     }
-    naming(called(contact.said_at, contact.name), [&] {
+    naming(named(contact.said_at, contact.name), [&] {
       require_not_negative(contact.friction, "the friction");
       require_positive(contact.resolution, "the resolution");
     });
@@ -316,7 +313,7 @@ void check_selections(const Model& model) {
   };
   for (const Fix& fix : model.fixes) {
     check(fix.body, fix.nodes, "fix");
-    check_numbers(fix.displacement, fix.ramp, called(fix.said_at, "this fix on " + model.name_of(fix.body)));
+    check_numbers(fix.displacement, fix.ramp, named(fix.said_at, "this fix on " + model.name_of(fix.body)));
     if (fix.across && !is_unit(*fix.across)) {
       refuse(fix.said_at, "this fix on " + model.name_of(fix.body), "the plane of a slide has no unit normal");
     }
@@ -329,17 +326,17 @@ void check_selections(const Model& model) {
     if (model.is_solid(support.body)) {
       refuse(model, support.body, "a bed supports shells, and this is a solid: hold it by a fix");
     }
-    naming(called(support.said_at, "this support of " + model.name_of(support.body)),
+    naming(named(support.said_at, "this support of " + model.name_of(support.body)),
            [&] { require_positive(support.stiffness, "the stiffness"); });
     check_shares(support.shares, model.shells[support.body].mesh.triangles.size(),
-                 called(support.said_at, "this support of " + model.name_of(support.body)));
+                 named(support.said_at, "this support of " + model.name_of(support.body)));
   }
   for (const RigidMotionsFix& fix : model.rigid_motions) {
     check(fix.body, {0}, "fix of the rigid motions");
   }
   for (const Load& load : model.loads) {
     check(load.body, {0}, "load");
-    check_numbers(numbers_of(load), load.ramp, called(load.said_at, "this load on " + model.name_of(load.body)));
+    check_numbers(numbers_of(load), load.ramp, named(load.said_at, "this load on " + model.name_of(load.body)));
     std::visit(
         [&]<typename Kind>(const Kind& kind) {
           if constexpr (requires { kind.nodes; }) {
@@ -358,7 +355,7 @@ void check_selections(const Model& model) {
             } else {
               count = face_count(model, load.body);
             }
-            check_shares(kind.shares, count, called(load.said_at, "this load on " + model.name_of(load.body)));
+            check_shares(kind.shares, count, named(load.said_at, "this load on " + model.name_of(load.body)));
           }
         },
         load.kind);
@@ -382,9 +379,9 @@ void check_load_sizes(const Model& model, const RunSettings& settings) {
     const double most = factor * numbers_of(load).cwiseAbs().maxCoeff();
     if (!std::isfinite(most * most)) {
       throw InputError(
-          called(load.said_at, fmt::format("this load on {}, with its ramp, is larger than any force: is its "
-                                           "unit right?",
-                                           model.name_of(load.body))));
+          named(load.said_at, fmt::format("this load on {}, with its ramp, is larger than any force: is its "
+                                          "unit right?",
+                                          model.name_of(load.body))));
     }
   }
 }
@@ -397,7 +394,7 @@ void check_solid_bodies(const Model& model) {
     if (body.mesh.tetrahedra.empty()) {
       refuse(model, b, "the solid has no tetrahedra");
     }
-    const std::string name = called(body.said_at, body.name);
+    const std::string name = named(body.said_at, body.name);
     check_places(body.mesh.vertices, name);
     naming(name, [&] { require_valid(body.mesh); });
     for (std::size_t t = 0; t < body.mesh.tetrahedra.size(); ++t) {

@@ -220,7 +220,7 @@ std::vector<Vec3> curved_displacement(const Model& model, std::size_t body, cons
 }
 
 double largest_displacement(const Model& model, const State& state) {
-  constexpr std::size_t climbed = 16;  // patches around the largest may hold it
+  constexpr std::size_t candidate_count = 16;  // patches around the largest may hold it
   require_valid(model, state);
   double largest = 0;
   for (std::size_t i = model.first_node(model.shells.size()); i < state.displacement.size(); ++i) {
@@ -234,7 +234,7 @@ double largest_displacement(const Model& model, const State& state) {
         samples[t] = best_of_grid(patches, t);
       }
     });
-    const auto kept = samples.begin() + std::min(climbed, samples.size());
+    const auto kept = samples.begin() + std::min(candidate_count, samples.size());
     std::partial_sort(samples.begin(), kept, samples.end(),
                       [](const Sample& a, const Sample& b) { return a.length > b.length; });
     for (auto sample = samples.begin(); sample != kept; ++sample) {

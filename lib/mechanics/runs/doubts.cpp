@@ -5,6 +5,7 @@
 #include "tunica/mechanics/contact/rigid_shape.hpp"
 #include "tunica/mechanics/model/corner_normals.hpp"
 #include "tunica/mechanics/model/curvature.hpp"
+#include "tunica/mechanics/runs/detail/places.hpp"
 #include "tunica/mechanics/runs/solve.hpp"
 #include "tunica/shell/distance/target.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
@@ -39,10 +40,6 @@ constexpr double highest_waves = 0.003;
 constexpr double mmhg = 133.322387415e-6, most_in_image = 450 * mmhg;
 // Of bow_share(), from where bending is some 20 % too stiff.
 constexpr double largest_bow = 0.5;
-
-std::string at(const std::string& said_at, const std::string& otherwise) {
-  return said_at.empty() ? otherwise : said_at + ": " + otherwise;
-}
 
 // Mean thickness at the corners of a triangle, mm.
 double thickness_of(const ShellBody& body, std::size_t triangle) {
@@ -101,7 +98,7 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
         {Weight::major, "thick wall",
          fmt::format("{}: its thickness, {:.4g} mm, is more than the radius of curvature over {:.0f} % of its area, so "
                      "that a thin shell does not stand for this wall: is the unit right?",
-                     at(body.said_at, body.name), most, 100 * share)});
+                     named(body.said_at, body.name), most, 100 * share)});
     return;
   }
   if (const double diagonal_mm = diagonal(flat_facets(body.mesh)); most > thickest * diagonal_mm) {
@@ -109,7 +106,7 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
         {Weight::major, "thick wall",
          fmt::format("{}: its thickness, {:.4g} mm, is more than a twentieth of the body's diagonal, {:.4g} mm: "
                      "this is no thin shell, whose wall does not shear; is the unit right?",
-                     at(body.said_at, body.name), most, diagonal_mm)});
+                     named(body.said_at, body.name), most, diagonal_mm)});
     return;
   }
   const auto [by_radius, whole] = thickness_by_radius(body, curvatures);
@@ -119,7 +116,7 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
          fmt::format("{}: its thickness, {:.4g} mm, is more than a quarter of a vessel's radius, or an eighth of a "
                      "ball's, in the mean over its area: pressure on the inner face moves so thick a wall at least "
                      "some 10 % less than this thin one",
-                     at(body.said_at, body.name), most)});
+                     named(body.said_at, body.name), most)});
   }
 }
 
@@ -153,7 +150,7 @@ void doubt_overlaps(const ShellBody& body, std::vector<Warning>& found) {
         {share > most_of_it ? Weight::major : Weight::minor, "thick wall",
          fmt::format("{}: over {:.0f} % of its area its walls, {:.4g} mm thick, are nearer to each other than "
                      "that and overlap, so that no lumen is left there: is the unit right?",
-                     at(body.said_at, body.name), 100 * share,
+                     named(body.said_at, body.name), 100 * share,
                      *std::max_element(body.thickness.begin(), body.thickness.end()))});
   }
 }
@@ -220,15 +217,15 @@ void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
                      "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles may be "
                      "too high by 10 % (membrane), and at the faces be two to three times those of a smooth organ; go "
                      "by the mean membrane stress, or take a finer image",
-                     at(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
+                     named(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
                      longest / 2 / wall)});
   } else if (longest > wall / 2) {
     found.push_back(
         {Weight::note, "large voxels",
-         fmt::format("{}: the voxels of its image, {:.3g} mm, are {:.2g} times the wall: what is left of their "
-                     "steps bends it, and the 99th percentile at the faces may be twice that of a smooth vessel; the "
-                     "membrane stress holds to some per cent",
-                     at(body.said_at, body.name), longest, longest / wall)});
+         fmt::format("{}: the voxels of its image, {:.3g} mm, are {:.2g} times the wall: the steps of the "
+                     "voxels show in the surface. The 99th percentile of stress at the faces may be twice that of a "
+                     "smooth vessel; the membrane stress is right to some per cent",
+                     named(body.said_at, body.name), longest, longest / wall)});
   }
 }
 
@@ -310,7 +307,7 @@ void doubt_coarseness(const ShellBody& body, std::vector<Warning>& found) {
              "{}: its shells are coarse for so thin a curved wall: the stress at its faces may be {} too low, "
              "and displacements by up to {:.0f} %: take more shells, as far as the surface has them, or name the "
              "surface that they were fitted to (--target), by which the error of each number is estimated",
-             at(body.said_at, body.name), used > far_beyond ? "more than 30 %" : "10 to 30 %",
+             named(body.said_at, body.name), used > far_beyond ? "more than 30 %" : "10 to 30 %",
              100 * std::min(1.0, of_bow * bow + of_waves * waves))});
   }
 }
@@ -443,7 +440,7 @@ void doubt_steps(const std::string& where, const char* what, const Ramp& ramp, c
 void doubt_loads(const Model& model, const RunSettings& settings,
                  const std::vector<std::vector<std::array<bool, 6>>>& held, std::vector<Warning>& found) {
   for (const Load& load : model.loads) {
-    const std::string where = at(load.said_at, model.name_of(load.body));
+    const std::string where = named(load.said_at, model.name_of(load.body));
     if (is_zero(load)) {
       found.push_back({Weight::minor, "no load", where + ": this load is zero"});
     } else if (stays_zero(load.ramp, settings)) {
@@ -475,10 +472,10 @@ void doubt_loads(const Model& model, const RunSettings& settings,
   for (const Fix& fix : model.fixes) {
     if (prescribes(fix) && stays_zero(fix.ramp, settings)) {
       found.push_back({Weight::minor, "no load",
-                       at(fix.said_at, model.name_of(fix.body)) +
+                       named(fix.said_at, model.name_of(fix.body)) +
                            ": the ramp of this displacement is zero during the whole run, so it moves nothing"});
     }
-    doubt_steps(at(fix.said_at, model.name_of(fix.body)), "displacement", fix.ramp, settings, found);
+    doubt_steps(named(fix.said_at, model.name_of(fix.body)), "displacement", fix.ramp, settings, found);
   }
 }
 
@@ -518,7 +515,7 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     if (found.size() == before) {
       doubt_overlaps(body, found);
     }
-    doubt_material(at(body.said_at, body.name), body.material, is_pressed(model, b), found);
+    doubt_material(named(body.said_at, body.name), body.material, is_pressed(model, b), found);
     doubt_voxels(body, found);
     if (!has_estimates) {
       doubt_coarseness(body, found);
@@ -526,22 +523,22 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {
       found.push_back({Weight::major, "held altogether",
-                       at(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move"});
+                       named(body.said_at, body.name) + ": all its nodes are held, so nothing of it can move"});
     }
   }
   for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
     const SolidBody& solid = model.solids[b - model.shells.size()];
-    doubt_material(at(solid.said_at, solid.name), solid.material, false, found);
+    doubt_material(named(solid.said_at, solid.name), solid.material, false, found);
     held.push_back(held_freedoms(model, b));
   }
   doubt_loads(model, settings, held, found);
   for (const Support& bed : model.supports) {
-    doubt_bed(at(bed.said_at, model.name_of(bed.body)), bed, found);
+    doubt_bed(named(bed.said_at, model.name_of(bed.body)), bed, found);
   }
   for (const Contact& contact : model.contacts) {
     if (!contact.consistent) {
       found.push_back({Weight::minor, "the paper's transfer",
-                       at(contact.said_at, contact.name) +
+                       named(contact.said_at, contact.name) +
                            ": transfer = \"paper\" spreads forces by the paper's rule, which is not in balance"});
     }
   }
@@ -549,7 +546,8 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
       std::holds_alternative<StaticRun>(settings.kind) || std::holds_alternative<DynamicRun>(settings.kind);
   if (needs_load && !is_loaded(model) && !model.is_imaged_under_pressure()) {
     const std::string& place = model.shells.empty() ? model.solids.front().said_at : model.shells.front().said_at;
-    found.push_back({Weight::minor, "no load", at(place, "nothing loads the model, so it stays as it is: add a load")});
+    found.push_back(
+        {Weight::minor, "no load", named(place, "nothing loads the model, so it stays as it is: add a load")});
   }
   return found;
 }

@@ -141,8 +141,8 @@ void doubt_slides(const Model& model, std::size_t b, std::vector<Warning>& found
   found.push_back(
       {slant > far_off ? Weight::major : Weight::minor, "slanting rim",
        fmt::format("{}: the rim at {} slides in its plane, which the wall meets some {:.0f} degrees off a right angle: "
-                   "stress around it may be off by {:.0f} to {:.0f} %, for nothing pulls there as the vessel that goes "
-                   "on would: hold it instead (--fix boundary, FIX=boundary), or cut the vessel straight across",
+                   "stress around it may be off by {:.0f} to {:.0f} %. Hold it instead (--fix boundary, FIX=boundary), "
+                   "or cut the vessel straight across",
                    named(body.said_at, body.name), where(middle),
                    std::asin(std::min(1.0, slant)) * 180 / std::numbers::pi, 1e2 * slant, 2e2 * slant)});
 }
@@ -302,13 +302,13 @@ std::vector<Warning> doubts_of_ends(const Model& model) {
     if (count > 0) {
       found.push_back(
           {Weight::minor, "free end",
-           fmt::format("{}: {} free, {}at {}: what continues it there would pull with the pressure times the lumen, "
-                       "{:.3g} N, and nothing does: hold the ends (--fix boundary, FIX=boundary), or let those "
-                       "that are cut straight across slide in their planes (--fix rims:slide, FIX=rims:slide)",
-                       named(body.said_at, body.name),
-                       count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
-                       count == 1 ? "" : "the widest ", where(widest->centre),
-                       std::abs(widest->pressure) * widest->area.norm())});
+           fmt::format(
+               "{}: {} free, {}at {}. In the body the rest of the organ pulls there with the pressure times the lumen, "
+               "{:.3g} N, which is missing here: hold the ends (--fix boundary, FIX=boundary), or let those "
+               "that are cut straight across slide in their planes (--fix rims:slide, FIX=rims:slide)",
+               named(body.said_at, body.name), count == 1 ? "an open end is" : fmt::format("{} open ends are", count),
+               count == 1 ? "" : "the widest ", where(widest->centre),
+               std::abs(widest->pressure) * widest->area.norm())});
     }
   }
   return found;
@@ -359,11 +359,12 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
       }
       found.push_back(
           {Weight::major, "swing",
-           fmt::format("{}{} swings: of the {:.3g} mm that it moves at most, {:.3g} mm are a motion as one, by {:.2g} "
-                       "degrees: what holds it in the body is missing: {}, or hold its other end, too (--fix, FIX)",
+           fmt::format("{}{} moves mostly as a rigid body: {:.0f} % of its largest displacement, {:.3g} mm, by {:.2g} "
+                       "degrees. What holds it in the body is missing: {}, or hold its other end, too (--fix, FIX)",
                        named(body.said_at, body.name),
-                       pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "", swing.largest,
-                       swing.rigid, swing.turn * 180 / std::numbers::pi, remedy_of_swings(model, b))});
+                       pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "",
+                       1e2 * std::min(swing.rigid / swing.largest, 1.0), swing.largest,
+                       swing.turn * 180 / std::numbers::pi, remedy_of_swings(model, b))});
     }
   }
   return found;
@@ -399,9 +400,9 @@ std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& se
   }
   const double value = std::get<PressureLoad>(sucked->kind).value;
   return {{Weight::major, "near buckling",
-           fmt::format("{}: the suction of {} is {:.0f} % of the load at which the perfect shell buckles: dents of a "
-                       "wall's thickness let it yield at a third of that, so that this state may not be reached: ask "
-                       "for less, or follow the path (control = \"arc-length\") of a shell with its dents",
+           fmt::format("{}: the suction of {} is {:.0f} % of the load at which the perfect shell buckles: a real "
+                       "wall, with dents as deep as it is thick, buckles at about a third of that load. Ask for less, "
+                       "or follow the path (control = \"arc-length\") of a shell with its dents",
                        named(sucked->said_at, model.name_of(sucked->body)), pressure_text(-value), 100 / factor)}};
 }
 

@@ -241,8 +241,8 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
       found.push_back(
           {Weight::major, "surface crosses itself",
            fmt::format(
-               "{}: passes through itself in {} pairs of shells, the first at {}: what is said of the wall around "
-               "holds for no body: mend the surface, or take more shells",
+               "{}: passes through itself in {} pairs of shells, the first at {}: the numbers of the wall around "
+               "there mean nothing: mend the surface, or take more shells",
                named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), what.first, where(what.second))});
       continue;
     }
@@ -277,7 +277,7 @@ void CrossingWatch::see(const State& state) {
     const std::string when = state.velocity.empty() ? fmt::format("at load factor {:.3g}", state.load_factor)
                                                     : fmt::format("at {:.3g} s", state.time);
     found_ = {Weight::major, kind,
-              fmt::format("{}: {} {}, the first at {}: what is said from there on holds for no body: add a [[contact]] "
+              fmt::format("{}: {} {}, the first at {}: the numbers from there on mean nothing: add a [[contact]] "
                           "between what meets, the same body twice where it is itself, or lower the load",
                           named(model_.shells.front().said_at, model_.shells.front().name), when, what, where(place))};
   };

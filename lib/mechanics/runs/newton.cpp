@@ -142,6 +142,18 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   return result;
 }
 
+bool TangentSolver::is_positive_definite(const BlockMatrix& matrix) const {
+  constexpr double golden_angle = 2.39996323;  // no two components are alike
+  VectorX any(narrow<Eigen::Index>(free_.size()));
+  for (Eigen::Index i = 0; i < any.size(); ++i) {
+    any[i] = std::cos(golden_angle * real(i));
+  }
+  mask(free_, any);
+  VectorX ignored = VectorX::Zero(any.size());
+  return !conjugate_gradients(matrix, free_, any, {settings_.cg_tolerance, settings_.cg_iterations, false}, ignored)
+              .negative_curvature;
+}
+
 Balance balance_at(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) {
   evaluate(system, at, forces, tangent);
   Balance balance;
@@ -172,7 +184,7 @@ class NewtonIteration {
 public:
   NewtonIteration(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                   const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                  Configuration& configuration)
+                  Configuration& configuration, std::size_t fewest_iterations)
       : system_(system),
         law_(system.law()),
         settings_(settings),
@@ -181,6 +193,7 @@ public:
         held_increment_(held_increment),
         matrix_(matrix),
         configuration_(configuration),
+        fewest_iterations_(fewest_iterations),
         left_(held_increment.squaredNorm() > 0 ? 1 : 0),
         whole_(VectorX::Zero(held_increment.size())) {}
 
@@ -248,7 +261,7 @@ private:
 
   /// At the floor of round-off a residual says nothing about the error any more; the increments still do.
   [[nodiscard]] bool at_rest() {
-    if (is_moving()) {
+    if (is_moving() || result_.iterations < std::min(fewest_iterations_, settings_.newton_max)) {
       return false;
     }
     return result_.residual <= settings_.converge || nothing_acts() || (is_at_floor() && last_size_ <= noise()) ||
@@ -419,6 +432,7 @@ private:
   const VectorX& held_increment_;
   BlockMatrix& matrix_;
   Configuration& configuration_;
+  std::size_t fewest_iterations_;
   NewtonResult result_;
   Balance now_;
   double left_;         ///< of the prescribed displacements, still to be moved
@@ -442,8 +456,9 @@ private:
 
 NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                    Configuration& configuration, bool likely_at_rest) {
-  return NewtonIteration(system, settings, solver, balance, held_increment, matrix, configuration).run(likely_at_rest);
+                    Configuration& configuration, bool likely_at_rest, std::size_t fewest_iterations) {
+  return NewtonIteration(system, settings, solver, balance, held_increment, matrix, configuration, fewest_iterations)
+      .run(likely_at_rest);
 }
 
 }  // namespace tunica

@@ -67,8 +67,14 @@ public:
     const VectorX held = prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor);
     begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
     // What was imaged under pressure may be there already.
-    NewtonResult result = newton(system_, settings_, *solver_, balance, held, matrix_, configuration,
-                                 system_.prestress_residual.has_value());
+    const bool likely_at_rest = system_.prestress_residual.has_value();
+    // One iteration knows no tangent but that of where it began: a straight column under its load looks stable there.
+    constexpr std::size_t fewest_iterations = 2;
+    NewtonResult result =
+        newton(system_, settings_, *solver_, balance, held, matrix_, configuration, likely_at_rest, fewest_iterations);
+    if (result.converged && settings_.solver == Solver::cg && !settings_.cg_fixed_count) {
+      result.stable = result.stable && solver_->is_positive_definite(matrix_);
+    }
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
       bool changed = false;
@@ -305,7 +311,7 @@ private:
         increment_ = step;
         continue;
       }
-      const SettleResult settled = leave_path(std::min(target, factor_ + beyond_the_limit * smallest), result);
+      const SettleResult settled = leave_path(beyond_the_limit * smallest, end, result);
       iterations += settled.iterations;
       cg_iterations += settled.cg_iterations;
       result.residual = settled.residual;
@@ -342,12 +348,19 @@ private:
     return (result.converged || (result.valid && one_linearisation)) && result.stable && !left_the_path;
   }
 
-  /// From where the path breaks off to the next state of rest, at a load factor beyond. Errors: RequirementError: none.
-  SettleResult leave_path(double beyond, const NewtonResult& failed) {
+  /// From where the path breaks off to the next state of rest, at a load factor beyond. Just beyond a branch point next
+  /// to nothing drives the shell away: then more load does. Errors: RequirementError: there is none up to `end`, where
+  /// loads may turn.
+  SettleResult leave_path(double past, double end, const NewtonResult& failed) {
+    constexpr double more = 16;
+    const double beyond = std::min(end, factor_ + past);
     Configuration attempt = configuration_;
     const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
     NewtonResult told = failed;
     told.apart = failed.apart && (!settled.settled || is_apart(attempt));
+    if (!settled.settled && !settled.ran_away && !system_.contact && beyond < end) {
+      return leave_path(more * past, end, failed);
+    }
     if (!settled.settled || !told.apart) {
       fail(told, settled, settled.ran_away ? loose_body(attempt) : "", place_of_yielding(attempt));
     }

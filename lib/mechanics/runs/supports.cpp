@@ -142,14 +142,14 @@ std::vector<std::size_t> determinate_supports(const ShellSystem& system, const P
 /// Projectors on the translations among rigid motions and on the axes about which they turn: those of rotations about
 /// the centre. A motion that is neither, such as one about a node that is held, has no part in them.
 void set_projectors(const Eigen::Matrix<double, 6, Eigen::Dynamic>& motions, Piece& piece) {
-  constexpr double hardly = 1e-6;
+  constexpr double negligible = 1e-6;
   const Mat6 onto = motions * motions.transpose();
   const auto project = [&](Eigen::Index part) {
     // Unit vectors that stay as they are.
     const Eigen::SelfAdjointEigenSolver<Mat3> eigen(onto.block<3, 3>(part, part));
     Mat3 projector = Mat3::Zero();
     for (int k = 0; k < 3; ++k) {
-      if (eigen.eigenvalues()[k] > 1 - hardly) {
+      if (eigen.eigenvalues()[k] > 1 - negligible) {
         projector += eigen.eigenvectors().col(k) * eigen.eigenvectors().col(k).transpose();
       }
     }

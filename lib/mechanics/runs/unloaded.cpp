@@ -26,9 +26,10 @@ constexpr double wanted = 1e-3;
 constexpr double farthest = 1e-2;  // more is no such shape; enough under a part of the pressure
 constexpr double elsewhere = 0.1;  // a state of rest farther from the image is another one
 constexpr std::size_t most_iterations = 40;
-constexpr std::size_t patience = 8;    // iterations in a row that come no nearer
-constexpr std::size_t remembered = 5;  // iterates that the acceleration combines
-constexpr double mixed = 0.5;  // of the residual that they leave: waves as short as the shells are overshot by more
+constexpr std::size_t patience = 8;       // iterations in a row that come no nearer
+constexpr std::size_t iterates_kept = 5;  // iterates that the acceleration combines
+constexpr double step_share =
+    0.5;  // of the residual that they leave: waves as short as the shells are overshot by more
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 
@@ -249,14 +250,14 @@ public:
     if (last_residual_.size() > 0) {
       residual_changes_.push_back(residual - last_residual_);
       image_changes_.push_back(g - last_image_);
-      if (residual_changes_.size() > remembered) {
+      if (residual_changes_.size() > iterates_kept) {
         residual_changes_.pop_front();
         image_changes_.pop_front();
       }
     }
     last_residual_ = residual;
     last_image_ = g;
-    VectorX result = y + mixed * residual;
+    VectorX result = y + step_share * residual;
     if (!residual_changes_.empty()) {
       Eigen::MatrixXd changes(y.size(), narrow<Eigen::Index>(residual_changes_.size()));
       for (std::size_t k = 0; k < residual_changes_.size(); ++k) {
@@ -264,7 +265,7 @@ public:
       }
       const VectorX weights = changes.colPivHouseholderQr().solve(residual);
       for (std::size_t k = 0; k < residual_changes_.size(); ++k) {
-        result -= weights[narrow<Eigen::Index>(k)] * (image_changes_[k] - (1 - mixed) * residual_changes_[k]);
+        result -= weights[narrow<Eigen::Index>(k)] * (image_changes_[k] - (1 - step_share) * residual_changes_[k]);
       }
     }
     return result;
@@ -296,8 +297,8 @@ struct Approach {
   bool near = false;                              ///< it is less than `farthest`
 };
 
-/// Finds a motion that a map leaves where it is. @param enough  of the mean displacement, what it may still change
-Approach approach(InverseStatics& inverse, VectorX motion, double enough,
+/// Finds a motion that a map leaves where it is. @param tolerance  of the mean displacement, what it may still change
+Approach approach(InverseStatics& inverse, VectorX motion, double tolerance,
                   const std::function<std::optional<VectorX>(const VectorX&)>& map) {
   inverse.reason = "the iterations do not converge";
   Acceleration acceleration;
@@ -316,7 +317,7 @@ Approach approach(InverseStatics& inverse, VectorX motion, double enough,
       best = {motion, off};
       size = inverse.lengths(*next)[0];
     }
-    if (off[0] <= enough * size) {
+    if (off[0] <= tolerance * size) {
       break;
     }
     motion = acceleration.next(motion, *next);

@@ -30,7 +30,6 @@ struct CaseReport {
   std::vector<ToldWarning> warnings;   ///< of all stages, the heaviest first, redacted
   std::vector<std::string> notes;      ///< of all stages, redacted
   std::vector<std::string> missing;    ///< what could not be drawn, and why, redacted
-  std::string scene;                   ///< as resolved, TOML; empty where there is no result
   SeenSurface seen;                    ///< what the picture shows
   std::string picture;                 ///< PNG of the loaded organ; empty: none
   double picture_top = 0;              ///< MPa, of its last colour; 0: the picture is plain

@@ -24,8 +24,8 @@ struct CornerFeet {
   std::array<Index, 3> nearest;
 };
 
-/// Largest distance of a flat triangle from a surface; infinite when nothing at most `enough` can be shown.
-double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const CornerFeet& c, double enough,
+/// Largest distance of a flat triangle from a surface; infinite when nothing at most `goal` can be shown.
+double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const CornerFeet& c, double goal,
                   CoverBound::Visited& visited) {
   double best = infinity;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -34,15 +34,15 @@ double flat_bound(const ClosestPoint& tree, const CoverBound& cover, const Corne
     }
     best = std::min(best, std::sqrt(tree.max_squared_distance_to(c.point, c.nearest[i])));
   }
-  if (best <= enough) {
+  if (best <= goal) {
     return best;
   }
   for (std::size_t i = 0; i < 3; ++i) {
     if (i > 0 && (c.nearest[i] == c.nearest[0] || (i == 2 && c.nearest[2] == c.nearest[1]))) {
       continue;
     }
-    const double bound = cover(c.point, c.nearest[i], enough, visited);
-    if (bound <= enough) {
+    const double bound = cover(c.point, c.nearest[i], goal, visited);
+    if (bound <= goal) {
       return bound;
     }
   }
@@ -181,11 +181,11 @@ private:
       block.settled = std::max(block.settled, std::min(piece.upper, c.distance[0] + reach + bulge_of(piece)));
       return;
     }
-    const double enough = aim_.stop_at(std::max(lower_, block.lower));
+    const double goal = aim_.stop_at(std::max(lower_, block.lower));
     const double bulge = bulge_of(piece);
-    const double flat = flat_bound(tree_, cover_, piece.corners, std::max(enough - bulge, 0.0), block.visited);
+    const double flat = flat_bound(tree_, cover_, piece.corners, std::max(goal - bulge, 0.0), block.visited);
     piece.upper = std::min(piece.upper, flat + bulge);
-    if (piece.upper <= enough) {
+    if (piece.upper <= goal) {
       block.settled = std::max(block.settled, piece.upper);
     } else {
       block.live.push_back(piece);

@@ -189,7 +189,7 @@ private:
 
   /// Settles the piece, keeps or lists it.
   void bound(Piece piece, Block& block) const {
-    const double enough = aim_.stop_at(block.lower);
+    const double goal = aim_.stop_at(block.lower);
     const Corners& c = piece.corners;
     for (const Corner& corner : c) {
       SurfaceFoot foot = corner.foot;
@@ -210,23 +210,23 @@ private:
     const Index patch = c[one].foot.patch;
     Corners here = c;
     double farthest = 0;
-    for (std::size_t i = 0; i < 3 && farthest <= enough; ++i) {
+    for (std::size_t i = 0; i < 3 && farthest <= goal; ++i) {
       if (here[i].foot.patch != patch) {
         here[i].foot = search_.on_patch(here[i].at, patch, c[one].foot.at);
       }
       farthest = std::max(farthest, here[i].foot.distance);
     }
     if (const double bulged = farthest + search_.bulge(patch, here[0].foot.at, here[1].foot.at, here[2].foot.at);
-        bulged <= enough) {
+        bulged <= goal) {
       piece.upper = std::min(piece.upper, bulged);
-    } else if (farthest <= enough) {
+    } else if (farthest <= goal) {
       piece.upper = std::min(piece.upper, difference(patches_[patch], here));
     }
-    if (piece.upper > enough) {
+    if (piece.upper > goal) {
       // However small, a piece between folds may have feet far apart, and what is between these farther off than they.
       piece.upper = std::min(piece.upper, by_one_corner(c));
     }
-    if (piece.upper <= enough) {
+    if (piece.upper <= goal) {
       block.settled = std::max(block.settled, piece.upper);
     } else {
       block.live.push_back(piece);

@@ -297,9 +297,9 @@ private:
 
   DecimateResult attempt(std::size_t count) {
     const auto& history = collapse_.history();
-    const auto enough =
+    const auto reached =
         std::find_if(history.begin(), history.end(), [&](const Collapse& c) { return c.triangles_left <= count; });
-    const std::size_t steps = std::min(enough + 1, history.end()) - history.begin();
+    const std::size_t steps = std::min(reached + 1, history.end()) - history.begin();
     const bool all_of_it = count >= mesh_.triangles.size();
     ShapingOptions shape;
     shape.min_angle = *options_.min_angle;

@@ -235,7 +235,7 @@ Facing facing_of(const TriangleMesh& mesh) {
 
 TriangleMesh turned_outward(TriangleMesh mesh, const Facing& facing) {
   if (facing.is_wrong.size() != mesh.triangles.size()) {
-    throw InputError("which way the pieces face was told of another mesh: the numbers of triangles differ");
+    throw InputError("the sides of the pieces belong to another mesh: the numbers of triangles differ");
   }
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (facing.is_wrong[t]) {

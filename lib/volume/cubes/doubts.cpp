@@ -114,7 +114,7 @@ std::vector<Warning> doubt_hollows(const Subject& subject, const Mask& mask, con
                  "image: it stands on most sides around a hollow, {:.3g} % of what both fill, around {}: both faces of "
                  "a wall become one surface, and one pressure presses them in opposite directions; close the slit or "
                  "hole in the segmentation, or crop the image so that its border cuts the open end, and pass --face "
-                 "inner or --face outer; nothing is off where it is a solid that bends around something",
+                 "inner or --face outer. Where it is a solid that bends around something, all is well",
                  subject.name, 1e2 * shelter.share, subject.at(shelter.middle))}};
   }
   if (real(cavities.voxels) < least_share * real(count_voxels(mask))) {

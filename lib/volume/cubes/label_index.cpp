@@ -139,8 +139,10 @@ void LabelIndex::add_pieces(const std::vector<Piece<Meaning>>& pieces) {
     if (fresh) {
       const auto label = static_cast<double>(value);
       if (std::is_integral_v<Meaning> && static_cast<long double>(label) != static_cast<long double>(value)) {
-        throw InputError(fmt::format(
-            "its label {} is above 2^53, where labels cannot be told apart: give the labels smaller numbers", value));
+        throw InputError(
+            fmt::format("its label {} is above 2^53, where neighbouring labels become the same number: give the labels "
+                        "smaller numbers",
+                        value));
       }
       // Above 2^53 floating-point numbers are whole whatever they measure, and stand for their neighbours too.
       const bool measured = std::is_floating_point_v<Meaning> && std::abs(label) > 0x1p53;

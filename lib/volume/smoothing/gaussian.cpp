@@ -164,7 +164,7 @@ double level_of_volume(const Volume& field, double volume, double guess) {
   const auto excess = [&](double level) {
     return signed_volume(marching_cubes(field, {Inside::Rule::above, level})) / volume - 1;
   };
-  constexpr double enough = 1e-4;
+  constexpr double tolerance = 1e-4;
   constexpr int most_steps = 10;
   // The volume falls as the level rises.
   double low = 0;
@@ -183,7 +183,7 @@ double level_of_volume(const Volume& field, double volume, double guess) {
       best = level;
       best_excess = e;
     }
-    if (std::abs(e) < enough) {
+    if (std::abs(e) < tolerance) {
       break;
     }
     if (e > 0) {

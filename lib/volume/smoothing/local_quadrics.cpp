@@ -32,9 +32,9 @@ constexpr std::array<double, 4> radii{4, 5.7, 8, 11.3};
 constexpr double thinned_beyond = 7;
 /// Weighted mean of the squares by which a quadric misses the edges, in variances of their middles: up to this a radius
 /// counts in full, and at twice this not at all.
-constexpr double missed_little = 0.5;
+constexpr double least_tolerance = 0.5;
 /// Where the smallest radius misses more, by noise: up to this many times that.
-constexpr double missed_anyway = 1.3;
+constexpr double tolerance_factor = 1.3;
 /// Crossings whose normal turns away by more than the angle with this cosine are of another sheet.
 constexpr double least_cosine = 0.2;
 /// Least uncertainty of a middle, in voxels: that of what is taken as known about the surroundings.
@@ -193,7 +193,7 @@ public:
       const double misses = missed(quadric, placed, radius);
       double share = 1;
       if (radius == radii.front()) {
-        tolerated = std::max(missed_little, missed_anyway * misses);
+        tolerated = std::max(least_tolerance, tolerance_factor * misses);
       } else {
         share = std::clamp(2 - misses / tolerated, 0.0, 1.0);
       }

@@ -174,7 +174,7 @@ private:
   void relax(const VertexNeighbours& neighbours, const std::vector<bool>& active, int iterations,
              const Progress& progress) {
     constexpr double step = 0.25;
-    constexpr double enough = 1e-4;
+    constexpr double tolerance = 1e-4;
     const std::size_t size = now_.size();
     const auto moving = std::ranges::count(active, true);
     if (moving == 0) {
@@ -207,7 +207,7 @@ private:
         now_[v] = next[v];
       });
       momentum = faster;
-      if (moved < enough) {
+      if (moved < tolerance) {
         break;
       }
     }

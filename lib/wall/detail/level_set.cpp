@@ -11,7 +11,7 @@
 namespace tunica {
 namespace {
 
-constexpr double snapped = 0.2;       // of a cell: crossings so near a sample are on it, which leaves no slivers
+constexpr double snap_share = 0.2;    // of a cell: crossings so near a sample are on it, which leaves no slivers
 constexpr double margin = 2.5;        // cells around
 constexpr std::size_t block = 8;      // samples along an edge, a power of two
 constexpr int most_steps = 30;        // of a vertex onto the level
@@ -56,7 +56,7 @@ public:
     guess_ = hit.triangle;
     const double value = level_.value(hit);
     if (size == 1) {
-      store(from, std::abs(value) < snapped * cell_ ? 0 : value);
+      store(from, std::abs(value) < snap_share * cell_ ? 0 : value);
       return;
     }
     // Where the face has rims, the sign may turn anywhere beyond them, the distance does not.

@@ -130,7 +130,19 @@ TEST(Shares, OfNothingAreRefused) {
   };
   EXPECT_THAT(said(HalfSpaceNodes{0, 2, false}, false), HasSubstr("here: selects no node: the body reaches from"));
   EXPECT_THAT(said(HalfSpaceNodes{0, 1, false}, false), HasSubstr("nothing of the surface lies in it but 3 node(s)"));
-  EXPECT_THAT(said(SphereNodes{Vec3(0.5, 0.5, 0), 0.1}, true), HasSubstr("no boundary edge"));
+  EXPECT_THAT(said(SphereNodes{Vec3(0.5, 0.5, 0), 0.1}, true), HasSubstr("no boundary edge has both its ends"));
+  const ShellBody ball = flat_body(make_sphere(1, 0), 1000, 0.3, 0.01);
+  const SelectableBody closed(ball);
+  EXPECT_THAT(
+      [&] {
+        try {
+          (void)edges_of(closed, AllNodes{}, "here");
+          return std::string();
+        } catch (const InputError& error) {
+          return std::string(error.what());
+        }
+      }(),
+      HasSubstr("the body is closed"));
 }
 
 }  // namespace

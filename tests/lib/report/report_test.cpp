@@ -1,6 +1,6 @@
 #include "tunica/report/report.hpp"
 #include "tunica/core/narrow.hpp"
-#include "tunica/report/detail/command_words.hpp"
+#include "tunica/report/detail/arguments.hpp"
 #include "tunica/report/detail/drawn_shells.hpp"
 #include "tunica/report/detail/html.hpp"
 #include "tunica/report/detail/measures.hpp"
@@ -117,13 +117,26 @@ TEST(Measures, InputsAreShownAsTheyWereStated) {
   EXPECT_EQ(shown(one, "pressure_kpa"), "120 mmHg (16.0 kPa)") << "left out: that of the image";
 }
 
-TEST(CommandWords, AreThoseTheShellSees) {
-  EXPECT_THAT(command_words("tunica-extract 'my scan.nii' --label 3 'it'\\''s' ''"),
-              ElementsAre("tunica-extract", "my scan.nii", "--label", "3", "it's", ""));
-  const auto words = command_words("t --label 3 --isovalue=-0.5 --label 4");
-  EXPECT_EQ(flag_value(words, "--label"), "4");
-  EXPECT_EQ(flag_value(words, "--isovalue"), "-0.5");
-  EXPECT_EQ(flag_value(words, "--inside"), std::nullopt);
+TEST(Arguments, AreReadByNameAndWrittenForTheShell) {
+  PipelineCase one{"a/1", "out/a/1", "extract", "3", "", {}, {}};
+  const Json given{{"VOLUME", "my scan.nii"},
+                   {"OUT.ply", "-s.ply"},
+                   {"--label", "it's"},
+                   {"--isovalue", "-0.5"},
+                   {"--cut", {"above z=1mm", "below x=2mm"}},
+                   {"--largest", true}};
+  one.reports["extract"] = {{"arguments", given}};
+  EXPECT_EQ(argument(one, "extract", "--label"), "it's");
+  EXPECT_EQ(argument(one, "extract", "--cut"), "below x=2mm") << "the last counts";
+  EXPECT_EQ(argument(one, "extract", "--largest"), std::nullopt);
+  EXPECT_EQ(argument(one, "relax", "--shells"), std::nullopt);
+  EXPECT_EQ(command_of("tunica-extract", given),
+            "tunica-extract 'my scan.nii' ./-s.ply --label 'it'\\''s' --isovalue=-0.5 --cut 'above z=1mm' --cut 'below "
+            "x=2mm' --largest");
+  for (const Json& damaged : {Json(), Json(3), Json::array({1, Json()}), Json{{"--label", {{"a", 1}}}}}) {
+    one.reports["extract"]["arguments"] = damaged;
+    EXPECT_EQ(argument(one, "extract", "--label"), std::nullopt);
+  }
 }
 
 TEST(Outliers, AreFarFromTheMedianOfFiveAtLeast) {
@@ -142,15 +155,18 @@ TEST(Outliers, AreFarFromTheMedianOfFiveAtLeast) {
 TEST(RedactionTest, KnowsNamesAsWordsAlone) {
   PipelineCase one{"Meyer A/1", "out/Meyer A/1", "extract", "3", "", {}, {}};
   one.reports["extract"] = {{"inputs", {{{"path", "/data/Meyer A.nii.gz"}}}},
-                            {"command",
-                             "tunica-extract '/data/Meyer A.nii.gz' 'out/Meyer A/1/surface.ply' --label 1 "
-                             "--report 'Meyer A_Anna_1950/res/1/extract.json' --names 1950_Anna/t.tsv"}};
+                            {"arguments",
+                             {{"VOLUME", "/data/Meyer A.nii.gz"},
+                              {"OUT.ply", "out/Meyer A/1/surface.ply"},
+                              {"--report", "Meyer A_Anna_1950/res/1/extract.json"},
+                              {"--names", "1950_Anna/t.tsv"}}}};
   const Redaction redacted(one, 7);
   EXPECT_EQ(redacted("/data/Meyer A.nii.gz: has no label 1"), "VOLUME: has no label 1");
-  EXPECT_EQ(redacted("Meyer A: 1.1 g/cm3, kg/m3"), "case 7: 1.1 g/cm3, kg/m3");
+  EXPECT_EQ(redacted("Meyer A: 1.1 g/cm3, kg/m3, 1e5N/m3"), "case 7: 1.1 g/cm3, kg/m3, 1e5N/m3");
   EXPECT_EQ(redacted("see /pool/other.txt, 1950/x and 1100kg/m3"), "see [path], [path] and 1100kg/m3");
   for (const char* name : {"Meyer", "Anna", "1950"}) {
-    EXPECT_EQ(redacted(one.at("extract", "command").get<std::string>()).find(name), std::string::npos) << name;
+    EXPECT_EQ(redacted(command_of("tunica-extract", arguments_of(one, "extract"))).find(name), std::string::npos)
+        << name;
   }
   EXPECT_EQ(Redaction()("/data/Meyer A.nii.gz"), "/data/Meyer A.nii.gz");
 }

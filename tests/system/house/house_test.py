@@ -47,6 +47,17 @@ def kinds_without_a_row(files):
             for kind in re.findall(r'(?:Weight::(?:note|minor|major)|\{weight),\s*"([^"]+)"', text) if kind not in known}
 
 
+def keys_without_a_word(files):
+    """Keys that are written into reports and that docs/report-keys.md does not have: {key: path}."""
+    files = list(files)
+    page = " ".join(text for path, text in files if path in ("docs/report-keys.md", "docs/results.md"))
+    known = set(re.findall(r"\w+", page))
+    reporting = ("lib/chain/report.cpp", "lib/chain/volume_contents.cpp", "lib/io/result/run_report.cpp", "lib/io/scene/stated.cpp",
+                 "lib/cli/tool.cpp")
+    return {key: path for path, text in files if path in reporting or path.startswith("tools/") and path.endswith(".cpp")
+            for key in re.findall(r'(?:[{\s]\{|\[)"([a-z]\w*)"(?:,|\])', re.sub(r"for \(.*", "", text)) if key not in known}
+
+
 class House(unittest.TestCase):
     """Every rule on every file."""
 
@@ -67,6 +78,12 @@ class House(unittest.TestCase):
         page = ("docs/warnings.md", "| kind | means |\n| no load, thick wall | nothing |\n")
         code = 'tool.warn({Weight::minor,\n "no load", text});\nfound.push_back({Weight::major : Weight::minor, "bent rim", text});\n'
         self.assertEqual(kinds_without_a_row([page, ("tools/a.cpp", code)]), {"bent rim": "tools/a.cpp"})
+
+    def test_every_key_of_a_report_is_explained(self):
+        self.assertEqual(keys_without_a_word(text_files()), {})
+        page = ("docs/report-keys.md", "`a{b_mm}`")
+        code = ("lib/chain/report.cpp", 'Json result{{"a", 1}};\nresult["a"] = {{"b_mm", 2}};\nresult["c"] = {{"d", {{"a", 1}}}};')
+        self.assertEqual(keys_without_a_word([page, code]), dict.fromkeys(("c", "d"), "lib/chain/report.cpp"))
 
     def test_one_definition(self):
         """Two types of one name in the library's namespace break the one-definition rule without a word."""

@@ -267,7 +267,7 @@ class Integrators(Limit):
         for part, told in ((0.05, False), (0.7, True)):
             self.swing(1.4 * period, part * period, integrator="generalised-alpha")
             with open(self.bench.path("run.json"), encoding="utf-8") as file:
-                said = any("the steps are long for what swings" in warning for warning in json.load(file)["warnings"])
+                said = any("the steps are long for this motion" in warning for warning in json.load(file)["warnings"])
             self.assertEqual(said, told, part)
 
 

@@ -131,6 +131,23 @@ class Provenance(ToolTest):
             report = self.run_tool("extract", *words, "--no-paths", folder=folder, code=(2, 3))
             self.assertNotIn(PATIENT, json.dumps(report))
 
+    def test_no_paths_of_what_files_and_folders_name(self):
+        """A folder that is missing, a table beside the volume, the data of a header."""
+        folder = self.made_in(PATIENT)
+        self.run_tool("phantom", "sphere", folder / f"{PATIENT}.nii.gz", "--size", "20")
+        volume = f"{PATIENT}.nii.gz"
+        report = self.run_tool("extract", volume, f"{PATIENT}-folder/s.ply", "--label", "1", "--no-paths", folder=folder, code=5,
+                               says="does not exist")
+        self.assertNotIn(PATIENT, json.dumps(report))
+        (folder / f"{PATIENT}.csv").write_text("no table\n", encoding="utf-8")
+        report = self.run_tool("extract", volume, "s.ply", "--label", "1", "--no-paths", folder=folder)
+        self.assertIn("no line of a table of labels", " ".join(report["warnings"]))
+        self.assertNotIn(PATIENT, json.dumps(report))
+        (folder / "v.nhdr").write_text("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+                                       f"data file: {PATIENT}.raw\n", encoding="utf-8")
+        report = self.run_tool("extract", "v.nhdr", "t.ply", "--label", "1", "--no-paths", folder=folder, code=3, says="is missing")
+        self.assertNotIn(PATIENT, json.dumps(report))
+
 
 if __name__ == "__main__":
     unittest.main()

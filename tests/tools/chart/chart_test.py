@@ -318,6 +318,33 @@ class Reference(ChartCase):
         self.run_tool(other, fine, "--reference", fine, "-o", self.out, "--force",
                       says=("1 of 2 runs", "b.json", "pressure_mpa 0.008, 0.016 in the reference"))
 
+    def test_runs_that_act_elsewhere_than_the_reference_are_named(self):
+        def stating(name, displacement, **where):
+            load = {"body": name, "kind": "pressure", "value": "1000Pa", **where}
+            return self.write(name, {**report("tunica-simulate", seconds={"solve": 1.0}, max_displacement_mm=displacement),
+                                     "stated": {"pressure_mpa": 0.001, "scene": {"load": [load]}}})
+
+        region = {"where": {"above": {"axis": "z", "at": "0.001m"}}}
+        fine = stating("fine.json", 4.0, **region)
+        self.draw(stating("same.json", 4.4, **region), "--reference", fine)
+        for other in (stating("b.json", 2.0), stating("c.json", 2.0, where={"above": {"axis": "x", "at": "0.001m"}})):
+            self.draw(other, fine, "--reference", fine, warnings=1)
+            self.run_tool(other, fine, "--reference", fine, "-o", self.out, "--force", says=("1 of 2 runs", "[[load]]"))
+        nodes = [stating(f"n{i}.json", 4.0 + i, where={"nodes": [i]}) for i in range(2)]
+        self.draw(nodes[1], "--reference", nodes[0])
+
+    def test_no_front_across_organs(self):
+        def run(name, seconds, error, target):
+            return self.write(name, {**relax(8, error, seconds), "arguments": {"TARGET": "surface.ply"},
+                                     "inputs": [{"path": "surface.ply", "sha256": target}]})
+
+        self.draw(run("c.json", 1.0, 2.0, "a"), "--reference", run("d.json", 2.0, 1.0, "b"), warnings=1)
+        for targets, fronts in ((("a", "a"), 1), (("a", "b"), 0)):
+            runs = [run(f"{i}.json", 1.0 + i, 2.0 - i, target) for i, target in enumerate(targets)]
+            root, _, rows = self.draw(*runs)
+            self.assertEqual("Pareto front: no run is better in both" in texts(root), fronts == 1)
+            self.assertEqual(sum(int(row[6]) for row in rows), 2 * fronts)
+
     def test_a_distance_is_held_against_the_reference(self):
         fine = self.write("fine.json", relax(9, 0.5, 1.0))
         _, _, rows = self.draw(self.write("a.json", relax(1, 2.0, 1.0)), "--reference", fine)

@@ -131,8 +131,8 @@ class WholeNumbers(ExtractTest):
         for label in (2 ** 53 + 1, 2 ** 63 - 1):
             path = self.folder / "v.nii.gz"
             nibabel.save(nibabel.Nifti1Image(ball() * numpy.int64(label), numpy.eye(4), dtype=numpy.int64), path)
-            self.refuse(3, path, self.out, "--label", label, saying="cannot be told from its neighbours")
-            self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=["v.nii.gz", "cannot be told apart"])
+            self.refuse(3, path, self.out, "--label", label, saying="become the same number")
+            self.refuse(3, path, self.folder / "{label}.ply", "--all-labels", saying=["v.nii.gz", "become the same number"])
 
     def test_of_floats_beyond_2_to_53_are_no_labels(self):
         for kind, label in ((numpy.float64, 2.0 ** 53 + 2), (numpy.float32, 1e17)):

@@ -142,7 +142,7 @@ class CasePage(ReportTest):
         for told in ("optimal ANDES triangles with drilling freedoms [4], whose higher-order part is reduced where the shell "
                      "curves within an element (adapt)", "four fifths discrete Kirchhoff triangles [5] and one fifth the 9-term "
                      "cubic of [3] with the mean curvature that its boundary gives (dkt-comas)", "Batoz", "Felippa",
-                     "with the nodes of its boundary held", "A pressure of 1 kPa that follows the surface"):
+                     "with the nodes of its boundary held", "A pressure of 1 kPa that follows the surface was put on it with"):
             self.assertIn(told, methods)
         self.assertNotIn("one cubic shape function", methods)
         load = ["--pressure", "1kPa", "--young", "1MPa", "--poisson", "0.45", "--thickness", "1.5mm", "--fix", "boundary", "--static"]
@@ -152,6 +152,67 @@ class CasePage(ReportTest):
         methods = page.text[page.text.index("Methods, to paste"):]
         self.assertIn("constant-strain triangles (cst), in bending the 9-term cubic of [3] (comas)", methods)
         self.assertNotIn("Batoz", methods, "only what is used is cited")
+
+    def test_methods_name_regions_and_beds(self):
+        folder = self.copy("aneurysm")
+        mesh = folder / "shell.ply"
+        (folder / "scene.toml").write_text(f"""
+[run]
+kind = "static"
+geometry = "nonlinear"
+[[shell]]
+name = "organ"
+mesh = "{mesh}"
+thickness = "1.5mm"
+young = "1MPa"
+poisson = 0.45
+[[fix]]
+body = "organ"
+where = {{boundary = true}}
+translation = "xyz"
+rotation = "xyz"
+[[support]]
+body = "organ"
+stiffness = "1e6N/m3"
+direction = "normal"
+where = {{above = {{axis = "z", at = "0mm"}}}}
+[[load]]
+body = "organ"
+kind = "pressure"
+value = "1kPa"
+where = {{below = {{axis = "z", at = "10mm"}}}}
+[[load]]
+body = "organ"
+kind = "force"
+value = ["0N", "0N", "1mN"]
+where = {{nodes = [1]}}
+""", encoding="utf-8")
+        run_tool("simulate", "--scene", folder / "scene.toml", folder / "result.hdf", "--quiet", "--force",
+                 report=folder / "simulate.json")
+        _, _, page = self.report()
+        methods = page.text[page.text.index("Methods, to paste"):]
+        for told in ("A pressure of 1 kPa that follows the surface was put on it in the region 'below z=10mm'",
+                     "a load of the kind 'force' was put on it in the region '1 node'",
+                     "on an elastic bed of 1e+06 N/m³ along its normals in the region 'above z=0mm'"):
+            self.assertIn(told, methods)
+
+    def test_methods_say_what_was_done_and_no_more(self):
+        folder = self.copy("aneurysm")
+        path = folder / "simulate.json"
+        report = json.loads(path.read_text())
+        report["stated"].update(loads=[{"kind": "pressure", "where": None, "follower": True, "ramped": True}],
+                                fix=["below z=0mm", "above z=12mm, moved by (0, 0, 0.1) mm"], imaged_at_mpa=None)
+        report["result"]["prestress"] = {"pressure_mpa": 0.001, "residual": 0, "stable": True}
+        path.write_text(json.dumps(report), encoding="utf-8")
+        for name in ("extract", "decimate"):
+            (folder / f"{name}.json").unlink()
+        _, _, page = self.report(folder=folder)
+        methods = page.text[page.text.index("Methods, to paste"):]
+        for told in ("times a table over time or load factor", "the region 'above z=12mm, moved by (0, 0, 0.1) mm' held",
+                     "taken under a pressure of 1 kPa"):
+            self.assertIn(told, methods)
+        for false in ("marching cubes", "decimated", "taken as unloaded"):
+            self.assertNotIn(false, methods)
 
     def test_inputs_are_told_as_they_were_stated(self):
         report = json.loads((self.case / "simulate.json").read_text())
@@ -199,8 +260,8 @@ class CasePage(ReportTest):
     def test_an_accuracy_that_was_not_reached_has_its_numbers(self):
         """The answer stands there with its error, and what is next helps."""
         def missed(reports):
-            command = reports["simulate"]["command"] + " --accuracy 5% --max-shells 4000"
-            reports["simulate"].update(ok=False, command=command, error="shell.ply: stress 159 kPa with 3200 shells, ...")
+            reports["simulate"]["arguments"].update({"--accuracy": "5%", "--max-shells": "4000"})
+            reports["simulate"].update(ok=False, error="shell.ply: stress 159 kPa with 3200 shells, ...")
             reports["simulate"]["result"]["wall"]["stress_p99_mpa"] = 0.159
             reports["simulate"]["result"]["shells"] = 3200
             reports["simulate"]["result"]["accuracy"] = {
@@ -215,8 +276,11 @@ class CasePage(ReportTest):
         self.assertEqual(re.findall(r"<dd><b>([^<]*)</b>", text)[0], "159")
         self.assertNotIn("not computed", page.text)
         self.assertIn("estimated error 12 %; von Mises", page.text)
-        self.assertRegex(page.text, r"Next, finer \(up to 51200 shells\): tunica-simulate .* --accuracy 5% --max-shells 51200\n")
-        self.assertRegex(page.text, r"Or, content with what was reached: tunica-simulate .* --accuracy 15% --max-shells 4000\n")
+        self.assertRegex(page.text,
+                         r"Next, finer \(up to 51200 shells\): tunica-simulate .* --accuracy 5% --max-shells 51200 --force\n")
+        self.assertRegex(page.text,
+                         r"Or, content with what was reached: tunica-simulate .* --accuracy 15% --max-shells 4000 --force\n")
+        self.assertIn("estimated at 12 %, which is not credible", page.text[page.text.index("Methods, to paste"):])
         self.assertRegex(done.stdout, r"missed/1 +simulate .* 3200 .* 159 +12 ")
         with open(table, encoding="utf-8", newline="") as file:
             row, = csv.DictReader(file, delimiter="\t")
@@ -234,8 +298,7 @@ class CasePage(ReportTest):
         if found is None:
             self.assertIn("Next, finer", page.text, "another reason than the number of shells")
             return
-        words = shlex.split(found[1])[1:]
-        run_tool("simulate", *words, "--force")
+        run_tool("simulate", *shlex.split(found[1])[1:])
 
     def test_a_run_that_ended_early_has_no_answer(self):
         """Its last state is one under a part of the load."""
@@ -334,7 +397,7 @@ class CasePage(ReportTest):
         damaged = [b"", b"\x89PNG", line, whole[:-1], whole + b"\0", b"[" * 100_000 + whole, b"[1]\n" + numbers_behind,
                    with_header(format="tunica page 2"), with_header(points=-1), with_header(points=2**40), with_header(kind="flight"),
                    with_header(states=[]), with_header(states=[[0, 0]]), with_header(states=[[0, 0, 0]] * 2000), with_header(pieces=3),
-                   with_header(points=header["points"] + 1), with_header(scene=None),
+                   with_header(points=header["points"] + 1),
                    whole[:corners] + struct.pack("<I", header["points"]) + whole[corners + 4:],
                    whole[:len(line) + 1] + struct.pack("<f", float("nan")) + whole[len(line) + 5:]]
         for data in damaged:
@@ -525,9 +588,9 @@ class CohortPage(ReportTest):
         def liver(reports):
             for report in reports.values():
                 report["warnings"] = []
-            reports["extract"]["command"] = reports["extract"]["command"].replace("--label 1", "--label '<i>liver'")
+            reports["extract"]["arguments"]["--label"] = "<i>liver"
             reports["extract"]["result"]["voxel_volume_mm3"] = 1600000
-        self.assertIn("--label 1", json.loads((self.case / "extract.json").read_text())["command"])
+        self.assertEqual(json.loads((self.case / "extract.json").read_text())["arguments"]["--label"], "1")
         self.copy("zz-liver", liver)
         _, text, _ = self.report()
         self.assertEqual((text.count("(robust z"), text.count('<svg viewBox="0 0 320 58" role="img"')), (0, 8))
@@ -562,7 +625,7 @@ class CohortPage(ReportTest):
         self.assertEqual([image["alt"] for image in page.of("img") if "slices" in image["alt"]],
                          ["Nine slices of the image with the outline of the shells"])
         self.assertIn("vain/1/refined.ply: ", page.text, "the shells before are not those that the page is about")
-        self.assertIn("The error of the stress by number of shells and model is credibly below 4.2 % (5 % were asked for).", page.text)
+        self.assertIn("The error of the stress by number of shells and model is below 4.2 % (5 % were asked for).", page.text)
         self.assertIn("The error of the stress by number of shells and model is estimated at 4.2 % (5 % were asked for), "
                       "which is not credible.", page.text)
         self.assertNotIn("certified to be at most", page.text, "that is known of the shells before")
@@ -605,6 +668,7 @@ class CohortPage(ReportTest):
                 for report in reports.values():
                     report["warnings"] = [f"{self.out}/{name}/1/shell.ply: its normals", f"{name}.nii.gz: odd", volume]
                     report["command"] = f"tunica-extract '{volume}' '{self.out}/{name}/1/surface.ply' --label 1"
+                    report["arguments"] = {"VOLUME": volume, "OUT.ply": f"{self.out}/{name}/1/surface.ply", "--label": "1"}
                 self.assertTrue(text)
                 reports["extract"]["inputs"][0]["path"] = volume
                 reports["relax"].update(error=f"{self.out}/{name}/1/coarse.ply: of {volume}: no")
@@ -642,6 +706,7 @@ class HostileNames(ReportTest):
                 for report in reports.values():
                     report["warnings"] = [name]
                     report["command"] = name
+                    report["arguments"] = {name: name, "--label": name, "VOLUME": name}
                     report["version"] = name
                 reports["relax"].update(ok=False, error=name)
                 reports["extract"]["inputs"][0]["path"] = name
@@ -735,7 +800,7 @@ class Errors(ReportTest):
 
     def test_verify_finds_files_whose_names_are_left_out(self):
         def left_out(reports):
-            reports["decimate"]["command"] += " --no-paths"
+            reports["decimate"]["arguments"]["--no-paths"] = True
             reports["decimate"]["outputs"][0]["path"] = "OUT.ply"
         case = self.copy("aneurysm", left_out)
         self.report("--verify")

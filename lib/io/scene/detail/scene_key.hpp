@@ -257,18 +257,21 @@ void read_keys(const SceneTable& table, const SceneKeys<Item>& keys, Item& item)
   }
 }
 
-/// What a table of an item says.
+/// What a table of an item says: key and value, in TOML.
+using WrittenKeys = std::vector<std::pair<std::string_view, std::string>>;
 template <typename Item>
-std::vector<std::string> written_keys(const SceneKeys<Item>& keys, const Item& item, const Writing& to) {
-  std::vector<std::string> lines;
+WrittenKeys written_keys(const SceneKeys<Item>& keys, const Item& item, const Writing& to) {
+  WrittenKeys written;
   for (const SceneKey<Item>& key : keys) {
     const std::string value = key.stands_in(item) ? key.access->write(item, to) : "";
     if (!value.empty()) {
-      lines.push_back(std::string(key.name) + " = " + value);
+      written.emplace_back(key.name, value);
     }
   }
-  return lines;
+  return written;
 }
+/// "key = value", one each.
+std::vector<std::string> lines_of(const WrittenKeys& written);
 
 /// Whether the numbers of an item lie in their ranges. Errors: as Place::fail().
 template <typename Item>
@@ -298,7 +301,7 @@ Form<Item> inner(const SceneKeys<Item>& keys, std::string like) {
             read_keys(own, keys, item);
             return item;
           },
-          [keys](const Item& item, const Writing& to) { return braced(written_keys(keys, item, to)); }};
+          [keys](const Item& item, const Writing& to) { return braced(lines_of(written_keys(keys, item, to))); }};
 }
 
 }  // namespace form

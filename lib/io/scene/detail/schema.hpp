@@ -39,4 +39,20 @@ void for_each_section(SceneLike& scene, const Visit& visit) {
   visit("probe", schema.probe, scene.probes);
 }
 
+/// Calls visit(section, whether it may stand several times, WrittenKeys) for each table of a scene file, in its order.
+/// @param folder  to which names of files are relative; empty: as they are
+template <typename Visit>
+void for_each_written_table(const Scene& scene, const std::filesystem::path& folder, const Visit& visit) {
+  const Writing to{&scene, folder};
+  visit("run", false, written_keys(scene_schema().run, scene, to));
+  for_each_section(scene, [&](std::string_view section, const auto& keys, const auto& items) {
+    for (const auto& item : items) {
+      visit(section, true, written_keys(keys, item, to));
+    }
+  });
+  if (scene.accuracy) {
+    visit("accuracy", false, written_keys(scene_schema().accuracy, *scene.accuracy, to));
+  }
+}
+
 }  // namespace tunica

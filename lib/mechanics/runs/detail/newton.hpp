@@ -33,6 +33,10 @@ public:
   /// @param same_matrix  the values are those of the last call: the factor at hand is used again
   Result solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix = false);
 
+  /// Whether the cg solver finds that the last matrix has no negative curvature: a right-hand side of some symmetry
+  /// does not see the modes of another, one that has a part of every mode does. Cost: one more solve.
+  bool is_positive_definite(const BlockMatrix& matrix) const;
+
   /// Whether the direct solver tells the error of its solutions, for one more solve each.
   void tell_direct_error(bool tell) { tell_direct_error_ = tell; }
   [[nodiscard]] bool tells_direct_error() const { return tell_direct_error_; }
@@ -87,9 +91,10 @@ struct NewtonResult {
 /// per node) moves prescribed freedoms. Steps are cut where they turn a node by more than 0.5 rad; where the residual
 /// does not fall in the end, a line search on the work of the unbalanced forces shortens them.
 /// @param likely_at_rest  the configuration may be in balance: the forces are looked at before a tangent is made
+/// @param fewest_iterations  of a configuration that is not in balance
 NewtonResult newton(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, const VectorX& held_increment, BlockMatrix& matrix,
-                    Configuration& configuration, bool likely_at_rest = false);
+                    Configuration& configuration, bool likely_at_rest = false, std::size_t fewest_iterations = 1);
 
 /// Size of an increment: root mean square over the nodes of displacements and (mean edge length x) rotations.
 double increment_size(const ShellSystem& system, const VectorX& increment);

@@ -33,11 +33,11 @@ struct Aim {
   }
   [[nodiscard]] bool decided_above(double lower) const { return limit && !list_beyond && lower - uncertainty > *limit; }
   /// Whether a place so far off is listed: those just below the limit too, which leave the answer open.
-  [[nodiscard]] bool is_listed(double distance) const { return list_beyond && distance > nearly * *limit; }
+  [[nodiscard]] bool is_listed(double distance) const { return list_beyond && distance > listed_share * *limit; }
   /// Whether a piece with a point so far off need not be cut any more.
   [[nodiscard]] bool is_beyond(double distance) const { return list_beyond && distance - uncertainty > *limit; }
 
-  static constexpr double nearly = 0.985;
+  static constexpr double listed_share = 0.985;
 };
 
 /// Largest distance from one surface to another, mm.
@@ -85,11 +85,11 @@ auto collected(const std::vector<Block>& blocks, const Aim& aim, double& lower, 
     }
     settled = std::max(settled, block.settled);
   }
-  const double enough = aim.stop_at(lower);
+  const double goal = aim.stop_at(lower);
   decltype(Block::live) live;
   for (const Block& block : blocks) {
     for (const auto& piece : block.live) {
-      if (piece.upper <= enough) {
+      if (piece.upper <= goal) {
         settled = std::max(settled, piece.upper);
       } else {
         live.push_back(piece);

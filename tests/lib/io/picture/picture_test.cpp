@@ -4,6 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/threads.hpp"
 #include "tunica/draw/detail/canvas.hpp"
+#include "tunica/draw/detail/svg_text.hpp"
 #include "tunica/draw/thumbnail.hpp"
 
 #include <gtest/gtest.h>
@@ -259,7 +260,7 @@ TEST(Canvas, TextIsMeasuredAsItIsDrawnInAnyOfItsScripts) {
       }
     }
     EXPECT_NEAR(left, 50, 5) << text;
-    EXPECT_NEAR(right, 50 + canvas.text_width(text, 40), 5) << text;
+    EXPECT_NEAR(right, 50 + text_width(text, 40), 5) << text;
   }
 }
 

@@ -56,13 +56,19 @@ TEST(Nrrd, EverySpace) {
                                      {"right-anterior-superior", {-1, -1, 1}},
                                      {"RAS", {-1, -1, 1}},
                                      {"LAS", {1, -1, 1}},
-                                     {"left-anterior-superior", {1, -1, 1}}}) {
+                                     {"left-anterior-superior", {1, -1, 1}},
+                                     {"LPI", {1, 1, -1}},
+                                     {"right-posterior-inferior-time", {-1, 1, -1}}}) {
     const std::string header = replaced(nrrd_header(), "left-posterior-superior", space);
     const VolumeFile file = read_both_ways(folder.file("v.nrrd", header + voxels));
     EXPECT_TRUE(file.volume.affine.isApprox(signs.asDiagonal() * sample_affine())) << space;
     EXPECT_THAT(file.warnings, IsEmpty());
   }
-  for (const std::string space : {"3D-right-handed", "scanner-xyz"}) {
+  const std::string turned = replaced(nrrd_header(), "left-posterior-superior", "SLA");
+  const Eigen::Matrix<double, 3, 4> affine = read_both_ways(folder.file("v.nrrd", turned + voxels)).volume.affine;
+  EXPECT_TRUE(affine.row(0).isApprox(sample_affine().row(1)) && affine.row(1).isApprox(-sample_affine().row(2)) &&
+              affine.row(2).isApprox(sample_affine().row(0)));
+  for (const std::string space : {"3D-right-handed", "scanner-xyz", "LRS", "left-posterior", "XYZ"}) {
     const std::string header = replaced(nrrd_header(), "left-posterior-superior", space);
     EXPECT_THAT(texts_of(read_both_ways(folder.file("v.nrrd", header + voxels)).warnings),
                 ElementsAre(HasSubstr(space)));
@@ -74,7 +80,13 @@ TEST(Nrrd, SpacingsWhenThereAreNoDirections) {
   const std::string header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 3 4 5\nspacings: 2 3 4\nencoding: raw\n\n";
   const VolumeFile file = read_both_ways(folder.file("v.nrrd", header + voxels));
   EXPECT_EQ(file.spacing, Vec3(2, 3, 4));
-  EXPECT_THAT(texts_of(file.warnings), ElementsAre(HasSubstr("placed by their spacings alone")));
+  EXPECT_THAT(texts_of(file.warnings),
+              ElementsAre(HasSubstr("placed by their spacings alone, with axes to the left, back and top")));
+  const std::string with_space = replaced(header, "encoding", "space: RAS\nspace origin: (1,2,3)\nencoding");
+  const VolumeFile turned = read_both_ways(folder.file("v.nrrd", with_space + voxels));
+  EXPECT_THAT(texts_of(turned.warnings),
+              ElementsAre(HasSubstr("by their spacings and the space origin, with axes of its space 'RAS'")));
+  EXPECT_EQ(turned.volume.affine.col(3), Vec3(-1, -2, 3));
   const auto warnings_of = [&](const std::string& spacings) {
     return texts_of(
         read_both_ways(folder.file("u.nrrd", replaced(header, "spacings: 2 3 4\n", spacings) + voxels)).warnings);
