@@ -72,7 +72,9 @@ public:
     constexpr std::size_t fewest_iterations = 2;
     NewtonResult result =
         newton(system_, settings_, *solver_, balance, held, matrix_, configuration, likely_at_rest, fewest_iterations);
-    if (result.converged && settings_.solver == Solver::cg && !settings_.cg_fixed_count) {
+    // Without an iteration no tangent was made; of what slides it is unsymmetric, and says nothing.
+    const bool asks = result.converged && result.iterations > 0 && !system_.law().slides();
+    if (asks && settings_.solver == Solver::cg && !settings_.cg_fixed_count) {
       result.stable = result.stable && solver_->is_positive_definite(matrix_);
     }
     const VectorX still = VectorX::Zero(held.size());

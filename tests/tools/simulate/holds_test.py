@@ -57,6 +57,12 @@ class Holds(SimulateTest):
         self.assertLess(report["result"]["max_displacement_mm"], 1e-6)
         self.assertEqual(report["stated"]["support"], {"stiffness_n_per_m3": 1e5, "direction": "all"})
 
+    def test_every_solver_finds_the_wall_at_rest(self):
+        """In balance as it is, it needs no tangent that could be asked whether it is stable."""
+        for solver in ("direct", "cg"):
+            report = self.run_tool("tube.ply", "out.hdf", *WALL, "--imaged-at", "1kPa", "--fix", "boundary", "--solver", solver)
+            self.assertEqual((report["result"]["newton_iterations"], report["result"]["short_waves_stiffened_from"]), (0, None))
+
     def test_free_ends_and_swings_are_said(self):
         report = self.run_tool("tube.ply", "out.hdf", *WALL, "--pressure", "1kPa", "--support", "1e7N/m3")
         self.assertIn("2 open ends are free", self.warnings(report))

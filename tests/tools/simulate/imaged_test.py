@@ -154,8 +154,11 @@ class Imaged(SimulateTest):
         self.assertEqual(few["estimates"]["max_displacement_mm"]["percent"], 0)
 
     def test_a_surface_no_finer_than_the_shells_gives_no_estimate(self):
-        write_ply(self.path("same.ply"), *oval(2)[:2])
-        report = self.run_tool("oval.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--target", "same.ply")
+        write_ply(self.path("oval.ply"), *oval(1))
+        write_ply(self.path("same.ply"), *oval(1)[:2])
+        run = ("oval.ply", "out.hdf", *THIN, "--imaged-at", "120mmHg", "--static", "--force")
+        self.assertIn("or name the surface", " ".join(self.run_tool(*run)["warnings"]))
+        report = self.run_tool(*run, "--target", "same.ply")
         self.assertEqual(report["result"]["estimates"], {})
         self.assertIn("too few to fit", " ".join(report["warnings"]))
         self.assertNotIn("or name the surface", " ".join(report["warnings"]))
