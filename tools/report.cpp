@@ -127,6 +127,7 @@ void run(cli::Tool& tool, const Arguments& given) {
     places += fmt::format("   read its warnings first: {} of {} cases done have some", page.warned,
                           cases.size() - page.failed);
   }
+  places += given.verify && page.different.empty() ? "   verified: every file is what its report says" : "";
   say_table(tool, places + "\n");
   require_verified(page.different);
 }

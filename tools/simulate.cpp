@@ -88,6 +88,7 @@ void run(cli::Tool& tool, const Arguments& a, RunRecord& record) {
   }
   settings.drawing.no_paths = tool.provenance().hides_paths();
   read_scene_of_run(tool, a, journal, settings);
+  settings.check = a.run.check;
   if (!a.run.check) {
     settings.out = out;
     settings.picture = a.picture.out;
@@ -97,7 +98,7 @@ void run(cli::Tool& tool, const Arguments& a, RunRecord& record) {
   tool.stated() = stated_inputs(settings.scene);
   chain::LoadedRun loaded = chain::load_run(settings, context);
   stage.reset();
-  chain::simulate(settings, std::move(loaded), std::move(journal), record, context);
+  chain::simulate(settings, std::move(loaded), record, context, std::move(journal));
   if (a.run.check) {
     tool.print(scene_text(settings.scene));
   }

@@ -245,6 +245,9 @@ private:
     out_.levels.push_back(level);
     measure_borders();
     near_serves_ = near_serves_ && (!near_ || answer.summary.newton_iterations <= most_from_near);
+    if (near_ && last_ && answer.summary.snaps.empty()) {  // it began beyond what the level before passed
+      answer.summary.snaps = last_->summary.snaps;
+    }
     field_change_ = last_ ? field_change(last_->at, answer.at, level_) : infinity;
     last_ = std::move(answer);
     if (statics() != nullptr && !statics()->linear && out_.levels.size() == fewest_levels - 1) {
@@ -369,9 +372,6 @@ private:
     if (last_->summary.stiffened_from) {
       out_.reasons.emplace_back(
           "the shells are coarse for so thin a wall: where they would have buckled edge by edge they were stiffened");
-    }
-    if (!last_->summary.snaps.empty()) {
-      out_.reasons.emplace_back("the shell snaps through on its way: where it rests then may depend on the mesh");
     }
     is_doubtful_ = !out_.reasons.empty();
   }

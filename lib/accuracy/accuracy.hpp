@@ -115,7 +115,7 @@ using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 ///
 /// Doubtful are: a small change beside a large one of the displacement field; for stresses, where all of the wall is
 /// near, a bending layer at supports, rims, point and edge loads and thickness jumps, sqrt(R t) / 1.24 wide, with less
-/// than two edges; shells that bend by more than 30 degrees; short waves that had to be made stiff; snaps. Every state
+/// than two edges; shells that bend by more than 30 degrees; short waves that had to be made stiff. Every state
 /// is one of a positive definite tangent: others are not equilibria that solve() accepts.
 /// @param bodies   the coarsest level; all of the model
 /// @param targets  one for each body; null: splits lie on the body's own patches, and its geometry's error is not seen

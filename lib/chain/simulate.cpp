@@ -55,9 +55,9 @@ struct Stages {
   }
 };
 
-void warn_of(const fs::path& subject, std::vector<Warning> warnings, const Context& context) {
+void warn_of(const std::string& subject, std::vector<Warning> warnings, const Context& context) {
   for (Warning& warning : warnings) {
-    warning.text = fmt::format("{}: {}", subject.string(), warning.text);
+    warning.text = fmt::format("{}: {}", subject, warning.text);
     context.warn(warning);
   }
 }
@@ -129,23 +129,32 @@ ExportOptions export_options(const SimulateSettings& settings) {
           .tessellation = static_cast<int>(drawing.tessellation.value_or(0))};
 }
 
-/// Where states go: the journal, the record, the result file, and what other programs draw.
+/// What messages are about: the file that was read first.
+std::string subject_of(const SimulateSettings& settings) {
+  return settings.inputs.empty() ? "the scene" : settings.inputs.front().string();
+}
+
+/// Where states go: the record, the result file, and what other programs draw.
 class Recorder {
 public:
-  Recorder(const SimulateSettings& settings, const System& system, const LoadedRun& loaded, RunJournal& journal,
-           RunRecord& record, const Context& context)
+  /// @param journal  of a run that writes files
+  Recorder(const SimulateSettings& settings, const System& system, const LoadedRun& loaded,
+           const std::optional<RunJournal>& journal, RunRecord& record, const Context& context)
       : pictured(settings),
         context_(context),
         model_(system.model()),
         is_modes_(chain::is_modes(settings.scene.run)),
         record_(record),
-        file_(settings.out, model_, result_options(settings, journal.identity(), record, context)),
         fields_(system),
         crossings_(model_) {
+    if (!journal) {
+      return;
+    }
+    file_.emplace(settings.out, model_, result_options(settings, journal->identity(), record, context));
     if (std::ranges::find(settings.drawing.exported, true) != settings.drawing.exported.end()) {
       ExportOptions options = export_options(settings);
       options.made_by = fmt::format("tunica {}: {}", version,
-                                    settings.resume ? context.redact(journal.identity().command) : context.command());
+                                    settings.resume ? context.redact(journal->identity().command) : context.command());
       options.overwrite = context.overwrite || settings.resume;
       options.space = loaded.space.value_or(options.space);
       exports_.emplace(settings.out, model_, options);
@@ -155,7 +164,9 @@ public:
   void operator()(const State& state) {
     const ElementFields of_state = fields_(state);
     record_.take(model_, state, of_state);
-    file_.append(state, of_state);
+    if (file_) {
+      file_->append(state, of_state);
+    }
     if (const auto written = exports_ ? exports_->append(state, of_state) : std::nullopt) {
       context_.wrote(*written);
     }
@@ -174,7 +185,9 @@ public:
     if (exports_) {
       exports_->commit();
     }
-    file_.commit(converged);  // last: what is not renamed can still be resumed
+    if (file_) {
+      file_->commit(converged);  // last: what is not renamed can still be resumed
+    }
   }
 
   [[nodiscard]] const std::optional<Warning>& crossing() const { return crossings_.found(); }
@@ -204,7 +217,7 @@ private:
   const Model& model_;
   bool is_modes_;
   RunRecord& record_;
-  ResultFile file_;
+  std::optional<ResultFile> file_;
   std::optional<ResultExport> exports_;
   ElementFieldEvaluator fields_;
   CrossingWatch crossings_;
@@ -305,7 +318,7 @@ System choose_model(SimulateSettings& settings, const LoadedRun& loaded, const M
   for (const auto& target : loaded.targets) {
     targets.push_back(target.get());
   }
-  const auto accuracy = std::make_shared<const Accuracy>(naming(settings.inputs.front().string(), [&] {
+  const auto accuracy = std::make_shared<const Accuracy>(naming(subject_of(settings), [&] {
     return solve_within(
         model.shells, targets, request, scene.run,
         [&](std::vector<ShellBody> bodies) { return resolve_scene(scene, std::move(bodies)); },
@@ -323,7 +336,7 @@ System choose_model(SimulateSettings& settings, const LoadedRun& loaded, const M
 /// Puts the stress of the image into the walls, or takes the shells back to what they are without its pressure.
 void take_as_imaged(std::optional<System>& system, const SimulateSettings& settings, RunRecord& record,
                     const Context& context) {
-  const fs::path& subject = settings.inputs.front();
+  const std::string subject = subject_of(settings);
   const Model& model = system->model();
   bool unload = false;
   for (const Load& load : model.loads) {
@@ -334,12 +347,12 @@ void take_as_imaged(std::optional<System>& system, const SimulateSettings& setti
     }
   }
   if (!unload) {
-    record.prestress_residual = naming(subject.string(), [&] { return *system->prestress_residual(); });
+    record.prestress_residual = naming(subject, [&] { return *system->prestress_residual(); });
     record.rests_as_imaged = system->rests_as_imaged();
     warn_of(subject, prestress_warnings(record), context);
     return;
   }
-  auto found = std::make_shared<Unloaded>(naming(subject.string(), [&] {
+  auto found = std::make_shared<Unloaded>(naming(subject, [&] {
     return find_unloaded(model, settings.scene.run, [&](double part, double change) {
       context.detail(
           fmt::format("unloaded shape: {:.3g} of the pressure, moved by {:.3g} mm in the mean", part, change));
@@ -373,39 +386,55 @@ RunJournal begin_journal(const SimulateSettings& settings, const LoadedRun& load
   return *std::move(before);
 }
 
-Summary solve_and_record(const System& system, const SimulateSettings& settings, RunJournal& journal, Recorder& record,
-                         Stages& stage, const Context& context) {
-  const std::string subject = settings.inputs.front().string();
+/// Ends a run that does not go on: its states are kept where files are written, and its journal goes.
+[[noreturn]] void fail_in_part(const std::string& why, const SimulateSettings& settings,
+                               std::optional<RunJournal>& journal) {
+  if (!journal) {
+    throw RequirementError(why);
+  }
+  journal->remove();
+  throw RequirementError(fmt::format("{}; what there is stays in {}.part", why, settings.out.string()));
+}
+
+/// @param journal  of a run that writes files
+Summary solve_and_record(const System& system, const SimulateSettings& settings, std::optional<RunJournal>& journal,
+                         Recorder& record, Stages& stage, const Context& context) {
+  const std::string subject = subject_of(settings);
   Resumption resumption;
   if (settings.resume) {
     const std::string part = settings.resume->string();
-    resumption.from = journal.replay(system.model(), std::ref(record));
+    resumption.from = journal->replay(system.model(), std::ref(record));
     context.note(resumption.from ? fmt::format("{}: goes on after step {}", part, resumption.from->summary.steps)
                                  : fmt::format("{}: begins again, it has no checkpoint yet", part));
   }
   stage("solve");
-  resumption.on_step = [&](const std::function<Checkpoint()>& make) {
-    stage("write");
-    journal.offer(make);
-    stage("solve");
-  };
+  if (journal) {
+    resumption.on_step = [&](const std::function<Checkpoint()>& make) {
+      stage("write");
+      journal->offer(make);
+      stage("solve");
+    };
+  }
   resumption.on_slow_step = [&](const std::string& text) {
     context.warn({Weight::note, "slow step", fmt::format("{}: {}", subject, text)});
   };
   const auto on_state = [&](const State& state) {
     stage("write");
-    journal.append(state);
+    if (journal) {
+      journal->append(state);
+    }
     record(state);
     stage("solve");
   };
   try {
     return naming(subject, [&] { return solve(system, on_state, context.progress("solve"), resumption); });
   } catch (const InputError&) {
-    journal.remove();
+    if (journal) {
+      journal->remove();
+    }
     throw;
   } catch (const RequirementError& error) {
-    journal.remove();  // it would end at the same step again
-    throw RequirementError(fmt::format("{}; what there is stays in {}.part", error.what(), settings.out.string()));
+    fail_in_part(error.what(), settings, journal);  // it would end at the same step again
   }
 }
 
@@ -445,10 +474,10 @@ void estimate(const System& system, const SimulateSettings& settings, const Load
     record.estimates = record.accuracy->estimates;
     return;
   }
-  const fs::path& subject = settings.inputs.front();
+  const std::string subject = subject_of(settings);
   if (may_refine(settings, loaded) && recorded.drawn) {
     stage("solve");
-    RefinedAnswers refined = naming(subject.string(), [&] {
+    RefinedAnswers refined = naming(subject, [&] {
       return estimate_by_refinement(
           system.model(), recorded.drawn->first, recorded.drawn->second, {loaded.targets.front().get()},
           system.settings(),
@@ -459,7 +488,7 @@ void estimate(const System& system, const SimulateSettings& settings, const Load
           {Weight::minor, "error of the mesh",
            fmt::format("{}: how far the answers may be off by the mesh is not known, for on shells split in four {}: "
                        "take more shells (SHELLS)",
-                       subject.string(), refined.reason)});
+                       subject, refined.reason)});
     }
     record.estimates = std::move(refined.estimates);
     stage("write");
@@ -467,17 +496,15 @@ void estimate(const System& system, const SimulateSettings& settings, const Load
   warn_of(subject, estimate_warnings(record.estimates), context);
 }
 
-void require_accuracy(const Accuracy& accuracy, const SimulateSettings& settings, RunJournal& journal,
+void require_accuracy(const Accuracy& accuracy, const SimulateSettings& settings, std::optional<RunJournal>& journal,
                       const Context& context) {
-  const std::string subject = settings.inputs.front().string();
+  const std::string subject = subject_of(settings);
   std::ranges::for_each(accuracy_notes(accuracy), context.note);
   if (accuracy.reasons.empty()) {
     return;
   }
   if (!accuracy.request.max_seconds) {
-    journal.remove();
-    throw RequirementError(fmt::format("{}: {}; what there is stays in {}.part", subject, missed_accuracy(accuracy),
-                                       settings.out.string()));
+    fail_in_part(fmt::format("{}: {}", subject, missed_accuracy(accuracy)), settings, journal);
   }
   context.warn(
       {Weight::minor, "accuracy not reached",
@@ -494,8 +521,11 @@ std::string when(const RunSettings& run, const State& state) {
                                     : fmt::format("under {:.4g} times the load", state.load_factor);
 }
 
-void tell_modes(const Summary& summary, const RunSettings& run, const fs::path& subject, const Context& context) {
+void tell_modes(const Summary& summary, const RunSettings& run, const std::string& subject, const Context& context) {
   const auto* frequencies = std::get_if<FrequencyRun>(&run.kind);
+  if (auto snap = snap_warning(summary)) {
+    warn_of(subject, {*std::move(snap)}, context);
+  }
   context.note(
       modes_note(summary, frequencies != nullptr ? frequencies->count : std::get<BucklingRun>(run.kind).count));
   if (summary.stiffened_from && frequencies == nullptr) {
@@ -503,7 +533,7 @@ void tell_modes(const Summary& summary, const RunSettings& run, const fs::path& 
         {Weight::major, "coarse shells",
          fmt::format("{}: the mesh is coarse for so thin a curved shell (h^2 > 3 R t): buckles shorter than its "
                      "elements are not seen, and the factors may be too high: refine it",
-                     subject.string())});
+                     subject)});
   }
 }
 
@@ -525,7 +555,7 @@ std::string answer_text(const LastState& last, bool with_wall) {
 
 void tell(const Model& model, const SimulateSettings& settings, const Recorder& recorded, const RunRecord& record,
           const Context& context) {
-  const fs::path& subject = settings.inputs.front();
+  const std::string subject = subject_of(settings);
   const LastState last = record.last.value_or(LastState());
   context.note(fmt::format(
       "{} nodes in {} step{}, {}: {}", model.node_count(), record.summary->steps, record.summary->steps == 1 ? "" : "s",
@@ -617,17 +647,17 @@ LoadedRun load_run(const SimulateSettings& settings, const Context& context) {
   return loaded;
 }
 
-void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJournal> before, RunRecord& record,
-              const Context& context) {
+void simulate(SimulateSettings settings, LoadedRun loaded, RunRecord& record, const Context& context,
+              std::optional<RunJournal> before) {
   Scene& scene = settings.scene;
   settings.inputs = loaded.inputs;
-  const std::string subject = settings.inputs.front().string();
+  const std::string subject = subject_of(settings);
   Stages stage{context};
   stage("setup");
   record = RunRecord(loaded.model, scene.run);
   std::optional<System> system;
   naming(subject, [&] { system.emplace(std::move(loaded.model), scene.run); });
-  if (scene.accuracy && !settings.out.empty()) {
+  if (scene.accuracy && !settings.check) {
     stage("solve");
     system = choose_model(settings, loaded, system->model(), record, context);
   }
@@ -635,7 +665,7 @@ void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJour
   const bool has_estimates = record.accuracy || may_refine(settings, loaded) || settings.target;
   std::ranges::for_each(doubts(system->model(), scene.run, has_estimates), context.warn);
   std::ranges::for_each(doubts_of_ends(system->model()), context.warn);
-  if (settings.out.empty()) {
+  if (settings.check) {
     return;
   }
   if (system->model().is_imaged_under_pressure()) {
@@ -643,12 +673,17 @@ void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJour
     take_as_imaged(system, settings, record, context);
   }
   const Model& model = system->model();
-  RunJournal journal = begin_journal(settings, loaded, std::move(before), context);
+  std::optional<RunJournal> journal;
+  if (!settings.out.empty()) {
+    journal.emplace(begin_journal(settings, loaded, std::move(before), context));
+  }
   stage("write");
   Recorder recorded(settings, *system, loaded, journal, record, context);
   if (record.accuracy) {
     for (const State& state : record.accuracy->states) {
-      journal.append(state);
+      if (journal) {
+        journal->append(state);
+      }
       recorded(state);
     }
     record.summary = record.accuracy->summary;
@@ -684,7 +719,9 @@ void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJour
     write_file(*settings.picture, result_picture(model, states, look), context.overwrite);
   }
   recorded.commit(record.converged);
-  journal.remove();
+  if (journal) {
+    journal->remove();
+  }
   if (is_modes(scene.run)) {
     tell_modes(*record.summary, scene.run, subject, context);
   } else {

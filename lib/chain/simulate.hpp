@@ -34,8 +34,9 @@ struct Drawing {
 /// A scene, and what is to be done with it.
 struct SimulateSettings {
   Scene scene;
-  std::filesystem::path out;                    ///< the result; empty: none is written
-  std::vector<std::filesystem::path> inputs;    ///< that have been read, the first in messages
+  bool check = false;                           ///< only whether it can be run
+  std::filesystem::path out;                    ///< the result; empty: no file is written
+  std::vector<std::filesystem::path> inputs;    ///< that have been read, the first in messages; none: all is in memory
   std::optional<std::filesystem::path> resume;  ///< the partial result that goes on
   Drawing drawing;
   std::optional<std::filesystem::path> picture;
@@ -70,10 +71,12 @@ LoadedRun load_run(const SimulateSettings& settings, const Context& context);
 
 /// Solves a scene: for an accuracy, under the pressure of the image, from where a run was stopped. Writes the result,
 /// exports and picture, and warns of what makes the answers doubtful.
-/// @param journal  of a run that goes on; @param record  what is known so far, also where this fails
+/// @param loaded  by load_run(); or, in memory, a model that resolve_scene() made of the scene and its bodies, and
+///   their targets
+/// @param record  what is known so far, also where this fails; @param journal  of a run that goes on
 /// Errors: InputError: as System and solve(), or another run goes on; RequirementError: no state of rest, or an
 /// accuracy that is not reached: what there is stays in `out`.part; OutputError.
-void simulate(SimulateSettings settings, LoadedRun loaded, std::optional<RunJournal> journal, RunRecord& record,
-              const Context& context);
+void simulate(SimulateSettings settings, LoadedRun loaded, RunRecord& record, const Context& context = {},
+              std::optional<RunJournal> journal = {});
 
 }  // namespace tunica::chain

@@ -88,9 +88,6 @@ std::string option_entry(const CLI::Option& option) {
   }
   const std::string description = capital(option.get_description());
   entry += roff(description) + (description.ends_with('.') ? "\n" : ".\n");
-  if (!value.choices.empty() && !value.described) {
-    entry += roff(fmt::format("One of {}.", fmt::join(value.choices, ", "))) + "\n";
-  }
   if (option.get_required()) {
     entry += "Required.\n";
   }

@@ -1,5 +1,8 @@
 #include "tunica/cli/detail/option_value.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <sstream>
@@ -10,32 +13,6 @@ namespace {
 bool is_word(const std::string& text) {
   return !text.empty() &&
          std::ranges::all_of(text, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; });
-}
-
-// The words of a description that ends in a choice: "bending element: comas (the paper's) | dkt (default dkt)".
-std::vector<std::string> described_choices(const std::string& description) {
-  std::string plain;
-  int depth = 0;
-  for (const char c : description) {
-    depth += c == '(' ? 1 : 0;
-    if (depth == 0) {
-      plain += c;
-    }
-    depth -= c == ')' ? 1 : 0;
-  }
-  if (plain.find('|') == std::string::npos) {
-    return {};
-  }
-  const std::size_t colon = plain.rfind(": ", plain.find('|'));
-  std::vector<std::string> words;
-  for (const std::string& part : split(colon == std::string::npos ? plain : plain.substr(colon + 2), '|')) {
-    const std::size_t begin = std::min(part.find_first_not_of(' '), part.size());
-    const std::string word = part.substr(begin, part.find_last_not_of(' ') + 1 - begin);
-    if (is_word(word)) {
-      words.push_back(word);
-    }
-  }
-  return words.size() > 1 ? words : std::vector<std::string>{};
 }
 
 }  // namespace
@@ -55,22 +32,18 @@ OptionValue value_of(const CLI::Option& option) {
     return value;
   }
   const std::string type = option.get_type_name();
-  const std::size_t colon = type.find(':');
-  value.placeholder = type.substr(0, colon);
+  value.placeholder = type;
   const std::size_t open = type.find('{');
   const std::size_t close = type.find('}');
   if (open != std::string::npos && close != std::string::npos && open < close) {
     value.choices = split(type.substr(open + 1, close - open - 1), ',');
+    value.placeholder = fmt::format("{}", fmt::join(value.choices, "|"));
   } else if (value.placeholder.find('|') != std::string::npos) {
     for (const std::string& word : split(value.placeholder, '|')) {
       if (is_word(word)) {
         value.choices.push_back(word);
       }
     }
-  }
-  if (value.choices.empty()) {
-    value.choices = described_choices(option.get_description());
-    value.described = !value.choices.empty();
   }
   constexpr std::array<const char*, 13> not_files{"NAME",   "WHERE",    "N",         "INT", "UINT",    "FLOAT", "SIZE",
                                                   "NUMBER", "QUANTITY", "TOLERANCE", "KEY", "PERCENT", "DEG"};

@@ -99,9 +99,9 @@ void PictureFlags::declare(Tool& tool) {
       ->type_name("OUT.png");
   app.add_option(
          "--colour", colour,
-         "what its colours show: membrane (von Mises stress, mean over the wall; the default) | stress (at either "
-         "face) | displacement | strain")
-      ->type_name("NAME");
+         "what its colours show: the von Mises stress as mean over the wall (membrane, the default) or at either face "
+         "(stress), or another field")
+      ->type_name("membrane|stress|displacement|strain");
   app.add_option("--magnify", magnify, "draw displacements N times as large (default 1)")->type_name("N");
   app.add_option("--picture-range", range,
                  "where its colours end, so that pictures can be compared, e.g. 200kPa, 3mm or, of strain, 5% "

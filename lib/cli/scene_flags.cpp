@@ -158,7 +158,7 @@ void SceneFlags::declare(Tool& tool) {
          "--fix", fixes,
          "what is held, may repeat: boundary | rims:slide (they widen and turn freely, and stay in their planes) "
          "| 'below z=-10mm' | 'above x=3cm' | rigid-motions (a closed organ under its own pressure)")
-      ->type_name("WHERE")
+      ->type_name("boundary|rims:slide|rigid-motions|WHERE")
       ->expected(1)
       ->allow_extra_args(false)  // the next word is a file
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -170,20 +170,18 @@ void SceneFlags::declare(Tool& tool) {
   tool.quantity("--step", step, dimension::time, help_of_key("run", "step"));
   tool.quantity("--ramp", ramp, dimension::time, "dynamic: the load grows from zero over this time (default: at once)");
   tool.group("Elements");
-  app.add_option("--membrane", membrane, help_of_key("shell", "membrane"))->type_name("NAME");
-  app.add_option("--bending", bending, help_of_key("shell", "bending"))->type_name("NAME");
+  app.add_option("--membrane", membrane, help_of_key("shell", "membrane"))
+      ->type_name(words_of(names_of<Membrane>, "|"));
+  app.add_option("--bending", bending, help_of_key("shell", "bending"))->type_name(words_of(names_of<Bending>, "|"));
   tool.group("Solver");
-  app.add_option("--solver", solver, help_of_key("run", "solver"))->type_name("NAME");
+  app.add_option("--solver", solver, help_of_key("run", "solver"))->type_name(words_of(names_of<Solver>, "|"));
   app.add_option("--cg-tolerance", cg_tolerance, help_of_key("run", "cg_tolerance"))->type_name("PERCENT");
-  app.add_option("--cg-iterations", cg_iterations,
-                 "at most N CG iterations; without --cg-tolerance a fixed count that asks for no convergence")
-      ->type_name("N");
+  app.add_option("--cg-iterations", cg_iterations, help_of_key("run", "cg_iterations"))->type_name("N");
   app.add_option("--converge", converge, help_of_key("run", "converge"))->type_name("NUMBER");
   tool.group("Output");
   app.add_option("--every", every, help_of_key("run", "every"))->type_name("N");
   tool.group("Scene");
-  app.add_option("--mesh-unit", mesh_unit, "unit of length of a mesh in a format that carries none: mm | cm | m | um")
-      ->type_name("mm|cm|m|um");
+  app.add_option("--mesh-unit", mesh_unit, help_of_key("shell", "unit"))->type_name("mm|cm|m|um");
 }
 
 bool SceneFlags::pressure_is_imaged() const {
@@ -284,8 +282,7 @@ void AccuracyFlags::declare(Tool& tool) {
   app.add_option("--accuracy", within,
                  "choose mesh and model: finer shells, until the estimated error of the answer is below this, e.g. 2%")
       ->type_name("PERCENT");
-  app.add_option("--of", of, fmt::format("the answer: {} (default displacement)", words_of(answers, " | ")))
-      ->type_name("NAME");
+  app.add_option("--of", of, "the answer (default displacement)")->type_name(words_of(answers, "|"));
   app.add_option("--target", target,
                  "the surface that SHELL.ply was fitted to: finer shells are fitted to it too; without --accuracy one "
                  "refinement is solved besides, which says how far the answers may be off")

@@ -58,10 +58,10 @@ std::optional<std::size_t> count_of(const std::optional<std::string>& text, cons
 std::optional<double> degrees_of(const std::optional<std::string>& text, const char* flag, double least, double most);
 
 /// The words of choices, one after the other.
-template <typename Value>
-std::string words_of(std::span<const Named<Value>> choices, const std::string& between) {
+template <typename Choices>
+std::string words_of(const Choices& choices, const std::string& between) {
   std::string words;
-  for (const Named<Value>& named : choices) {
+  for (const auto& named : choices) {
     words += (words.empty() ? "" : between) + std::string(named.word);
   }
   return words;

@@ -68,8 +68,7 @@ public:
     std::string head =
         "  " + (positional ? positional_name(*option) : fmt::format("{}", fmt::join(spellings(*option), ", ")));
     if (!positional && !value.placeholder.empty()) {
-      head += ' ' + (value.choices.empty() || value.described ? value.placeholder
-                                                              : fmt::format("{}", fmt::join(value.choices, "|")));
+      head += ' ' + value.placeholder;
     }
     const std::string gap = head.size() + 2 > descriptions_from ? "\n" + std::string(descriptions_from, ' ')
                                                                 : std::string(descriptions_from - head.size(), ' ');

@@ -252,7 +252,8 @@ std::string shown(const PipelineCase& one, const std::string& key) {
 
 std::string Reached::text() const {
   return fmt::format("{} {}, {}, {} % asked", of, value,
-                     percent ? fmt::format("estimated error {} %", figure_above(*percent)) : "error not estimated",
+                     percent ? fmt::format("estimated error {} %", figure_above(*percent))
+                             : "without a credible estimate of its error",
                      figure(asked));
 }
 

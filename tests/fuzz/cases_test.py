@@ -4,7 +4,6 @@
 import os
 import random
 import sys
-import time
 import unittest
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -49,7 +48,6 @@ class DamagedTables(unittest.TestCase):
         with TemporaryDirectory() as folder:
             path = Path(folder) / "cases.tsv"
             path.write_bytes(bytes_)
-            start = time.process_time()
             with mock.patch.dict(os.environ, {"CASES": str(path), "KIND": "static", "IMAGED_AT": "0kPa"}), mock.patch.object(cases, "say"):
                 try:
                     found = cases.find_cases(os.path.join(folder, "out"))
@@ -58,7 +56,6 @@ class DamagedTables(unittest.TestCase):
                     for line in refused.args:
                         self.assertTrue(line and "\n" not in line and "\0" not in line, (what, line))
                     found = None
-            self.assertLess(time.process_time() - start, 10, what)
             if found is None:
                 return False
             self.assertTrue(found, what)

@@ -8,12 +8,11 @@
 /// How help, manual pages and completions of shells see an option: one reading for all of them.
 namespace tunica::cli {
 
-/// What the words after an option stand for, read from its type name ("SCALE:{auto,linear,log}", "mm|cm", "FILE", "N")
-/// and, for choices that are explained one by one, from its description.
+/// What the words after an option stand for, read from its type name: "TEXT:{auto,linear,log}", "none|staircase|SIGMA",
+/// "FILE", "N".
 struct OptionValue {
-  std::string placeholder;           ///< empty for a flag
+  std::string placeholder;           ///< "auto|linear|log", "N"; empty for a flag
   std::vector<std::string> choices;  ///< empty: free
-  bool described = false;            ///< the choices are named in the description
   bool file = false;
 };
 

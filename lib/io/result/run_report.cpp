@@ -431,11 +431,11 @@ std::string level_note(const AccuracyLevel& level, const AccuracyRequest& reques
 }
 
 std::string missed_accuracy(const Accuracy& accuracy) {
-  return fmt::format(
-      "accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
-      value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
-      accuracy.estimate ? fmt::format("estimated error {}", percent_text(*accuracy.estimate)) : "error not estimated",
-      100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
+  return fmt::format("accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
+                     value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
+                     accuracy.estimate ? fmt::format("estimated error {}", percent_text(*accuracy.estimate))
+                                       : "without a credible estimate of its error",
+                     100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
 }
 
 std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
@@ -551,7 +551,43 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, 
   return warnings;
 }
 
+/// The first of some load factors.
+std::string factors_text(std::vector<double> factors) {
+  constexpr std::size_t most = 3;
+  const bool more = factors.size() > most;
+  factors.resize(std::min(factors.size(), most));
+  return fmt::format("{:.4g}{}", fmt::join(factors, ", "), more ? " …" : "");
+}
+
+/// What is wrong with the last state of a path, or of iterations that were counted.
+std::string unstable_text(const Summary& summary) {
+  std::string text =
+      "the last state is not stable: a body under its load alone leaves it, and stress and "
+      "displacement are not those that it comes to";
+  if (!summary.branch_factors.empty()) {
+    text += fmt::format("; other paths leave this one at load factor {}", factors_text(summary.branch_factors));
+  }
+  if (!summary.limit_factors.empty()) {
+    text += fmt::format("; the load factor turns at {}", factors_text(summary.limit_factors));
+  }
+  return text + ". A static run with load control, the default solver and no newton_max goes on to a state of rest";
+}
+
 }  // namespace
+
+std::optional<Warning> snap_warning(const Summary& summary) {
+  if (summary.snaps.empty()) {
+    return std::nullopt;
+  }
+  std::vector<double> factors;
+  std::ranges::transform(summary.snaps, std::back_inserter(factors), &Snap::load_factor);
+  return Warning{
+      Weight::major, "limit load",
+      fmt::format("beyond load factor {} the path is not stable: the body buckles or snaps, and goes on from the next "
+                  "state of rest that was found, up to {:.3g} mm away. Others may be near: a dynamic run shows which "
+                  "one the motion takes, arc length how the path itself goes on",
+                  factors_text(factors), std::ranges::max(summary.snaps, {}, &Snap::distance).distance)};
+}
 
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last) {
   std::vector<Warning> warnings;
@@ -580,13 +616,11 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
                      "{} in size or direction, stresses by as much or more; write geometry = \"nonlinear\"",
                      off < 1 ? fmt::format("{:.0f} %", 1e2 * off) : "100 % and more")});
   }
-  for (const Snap& snap : summary.snaps) {
-    warnings.push_back(
-        {Weight::major, "limit load",
-         fmt::format("at load factor {:.6g} the path of equilibria breaks off (limit load): the shell snaps, by up "
-                     "to {:.3g} mm, to the next state of rest, from which the load goes on; arc length shows the path, "
-                     "a dynamic run the motion",
-                     snap.load_factor, snap.distance)});
+  if (auto snap = snap_warning(summary)) {
+    warnings.push_back(*std::move(snap));
+  }
+  if (summary.ends_unstable) {
+    warnings.push_back({Weight::major, "unstable state", unstable_text(summary)});
   }
   if (summary.energy) {
     std::ranges::move(

@@ -115,6 +115,9 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy);
 /// A line on the modes found.
 std::string modes_note(const Summary& summary, std::size_t asked);
 
+/// That the body left its path, if it did.
+std::optional<Warning> snap_warning(const Summary& summary);
+
 /// What a user should know of a run that has ended well.
 std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary, const LastState& last);
 

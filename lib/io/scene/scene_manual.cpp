@@ -43,10 +43,9 @@ std::string help_of_key(std::string_view section, std::string_view key) {
     const auto found = std::ranges::find(keys, key, [](const auto& one) { return one.name; });
     if (of == section && found != keys.end()) {
       const bool is_choice = found->access->like().find(" | ") != std::string::npos;
-      help = !is_choice
-                 ? std::string(found->says)
-                 : fmt::format("{}{}{} (default {})", found->says, found->says.empty() ? "" : ": ",
-                               without_quotes(std::string(found->access->like())), without_quotes(found->fallback()));
+      help = std::string(found->says);
+      help += is_choice && !found->fallback().empty() ? fmt::format(" (default {})", without_quotes(found->fallback()))
+                                                      : "";
     }
   });
   return help;

@@ -200,7 +200,7 @@ SceneKeys<Scene> run_keys() {
                                   ? ""
                                   : of_other_run("until", "control = \"arc-length\"", scene.run);
                      }));
-  append(keys, SceneKeys<Run>{key("solver", &Run::solver, form::choice<Solver>())}, settings);
+  append(keys, SceneKeys<Run>{key("solver", &Run::solver, form::choice<Solver>(), "linear solver")}, settings);
   keys.push_back(key<Scene>(
                      "cg_tolerance", [](auto& scene) -> auto& { return scene.run.cg_tolerance; },
                      form::part("\"5%\"").in({0, 1, "{key} must be greater than 0 and less than 1 (100%)"}),
@@ -239,7 +239,9 @@ void append_material(SceneKeys<Body>& keys, bool needs_young) {
           "Young's modulus, e.g. 1MPa")
           .needed()
           .written_if([](const Material& material) { return material.young_stated; }),
-      key("poisson", &Material::poisson, form::number("0.45").in({-1, 0.5, "{key} {value} is outside (-1, 0.5)"}),
+      key("poisson", &Material::poisson,
+          form::number("0.45").in(
+              {-1, 0.5, "{key} {value} is outside (-1, 0.5): of what keeps its volume it is nearly 0.5, such as 0.49"}),
           "Poisson's ratio, in (-1, 0.5)")
           .needed(),
       key("density", &Material::density, form::quantity(dimension::density, "kg/m3", "\"1100kg/m3\"").in(positive),

@@ -264,6 +264,7 @@ private:
     if (!path_.find_direction(now_, {})) {
       throw RequirementError("arc length: the stiffness of the reference is singular");
     }
+    stable_pivots_ = now_.negative_pivots;
     length_ = step_ = run_.first_factor / now_.factor_slope;
   }
 
@@ -325,18 +326,23 @@ private:
 
   /// The end of the path itself, between a state before and one beyond it: the length of the step by the Illinois
   /// method. Where a state on the way is not found, the one beyond.
-  PathState end_at(const PathState& a, const PathState& b, double step, const End& end) {
+  /// @param step  becomes the length up to there
+  PathState end_at(const PathState& a, const PathState& b, double& step, const End& end) {
     constexpr int most_rounds = 60;
     const auto miss = [&](const PathState& state) { return value_of(end, state) - end.goal; };
     std::array<double, 2> bound{0, step};
     std::array<double, 2> missed{miss(a), miss(b)};
     std::size_t last = 2;  // the bound that was moved last
     PathState middle = b;
+    double ended = step;
     for (int round = 0; round < most_rounds && std::abs(miss(middle)) > 1e-10 * std::abs(end.goal); ++round) {
       const double length = (bound[0] * missed[1] - bound[1] * missed[0]) / (missed[1] - missed[0]);
       if (!(length > 0) || !find(a, length, middle)) {
-        return std::abs(miss(a)) <= 1e-10 * std::abs(end.goal) ? a : b;
+        const bool is_there = std::abs(miss(a)) <= 1e-10 * std::abs(end.goal);
+        step = is_there ? 0 : step;
+        return is_there ? a : b;
       }
+      ended = length;
       const std::size_t moved = (miss(middle) > 0) == (missed[1] > 0) ? 1 : 0;
       bound[moved] = length;
       missed[moved] = miss(middle);
@@ -345,6 +351,7 @@ private:
       }
       last = moved;
     }
+    step = ended;
     return middle;
   }
 
@@ -353,10 +360,38 @@ private:
     if (limit) {
       summary_.limit_factors.push_back(limit_factor(a, b, step));
     }
-    const auto change = narrow<long>(b.negative_pivots) - narrow<long>(a.negative_pivots);
-    if (std::abs(change) > (limit ? 1 : 0)) {
-      summary_.branch_factors.push_back((a.factor + b.factor) / 2);
+    if (passes_branch(a, b)) {
+      summary_.branch_factors.push_back(branch_factor(a, b, step));
     }
+    summary_.ends_unstable = b.negative_pivots > stable_pivots_;
+  }
+
+  /// Whether more modes have lost or gained stability between two states than the one that a limit point takes.
+  static bool passes_branch(const PathState& a, const PathState& b) {
+    const auto change = std::max(a.negative_pivots, b.negative_pivots) - std::min(a.negative_pivots, b.negative_pivots);
+    return change > (a.factor_slope * b.factor_slope < 0 ? 1U : 0U);
+  }
+
+  /// Where the first of these modes does, by halving the step: the stiffness itself tells on which side a state lies.
+  double branch_factor(const PathState& a, const PathState& b, double step) {
+    constexpr double precise = 1e-4;  // of the largest factor: less than what the mesh leaves open
+    PathState beyond = b;
+    double before = a.factor, from = 0, to = step;
+    const double largest = std::max({largest_factor_, std::abs(a.factor), std::abs(b.factor)});
+    while (std::abs(beyond.factor - before) > precise * largest && to - from > smallest_step * step) {
+      PathState middle;
+      if (!find(a, (from + to) / 2, middle)) {
+        break;
+      }
+      if (passes_branch(a, middle)) {
+        to = (from + to) / 2;
+        beyond = std::move(middle);
+      } else {
+        from = (from + to) / 2;
+        before = middle.factor;
+      }
+    }
+    return (before + beyond.factor) / 2;
   }
 
   [[nodiscard]] State state_now(std::size_t step) const {
@@ -397,7 +432,8 @@ private:
   double length_ = 0;  ///< of the path so far, and the first step
   bool only_follows_ = false;
   double largest_factor_ = 0;
-  bool reached_ = false;  ///< what `until` asks for
+  std::size_t stable_pivots_ = 0;  ///< negative ones of the reference: pressures of solids
+  bool reached_ = false;           ///< what `until` asks for
 };
 
 }  // namespace

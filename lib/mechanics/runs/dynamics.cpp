@@ -549,7 +549,11 @@ private:
       return balance(s, 1, c, tangent, predicted);
     };
     begin_contact(system_, settings_, s.time + s.length, s.time + s.length, configuration, solver_, matrix_);
-    const SettleResult settled = settle(system_, settings_, *solver_, whole, matrix_, configuration);
+    SettleResult settled;
+    try {
+      settled = settle(system_, settings_, *solver_, whole, matrix_, configuration);
+    } catch (const MemoryError&) {  // with the cg solver the step fails as without it
+    }
     result.ran_away = settled.ran_away;
     result.newton.apart = !system_.contact || !settled.settled || system_.contact->is_certain(configuration);
     const bool rests = settled.settled && result.newton.apart;

@@ -375,7 +375,7 @@ std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& se
   require_valid(model);
   const bool alone =
       model.solids.empty() && model.rigids.empty() && model.contacts.empty() && model.attachments.empty();
-  if (!alone || !std::holds_alternative<StaticRun>(settings.kind) || settings.solver == Solver::cg) {
+  if (!alone || !std::holds_alternative<StaticRun>(settings.kind)) {
     return {};
   }
   const auto sucked = std::ranges::find_if(model.loads, [](const Load& load) {
@@ -387,6 +387,7 @@ std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& se
   }
   RunSettings buckling = settings;
   buckling.kind = BucklingRun{1};
+  buckling.solver = Solver::direct;
   double factor = 0;
   try {
     factor = solve(model, buckling, [](const State&) {}).buckling_factors.front();
@@ -394,16 +395,22 @@ std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& se
     return {};
   } catch (const InputError&) {  // nothing of the kind can be asked of it
     return {};
-  }
-  if (factor * sensitive >= 1) {
+  } catch (const MemoryError&) {  // it would take more than the run, by cg, itself
     return {};
   }
-  const double value = std::get<PressureLoad>(sucked->kind).value;
-  return {{Weight::major, "near buckling",
-           fmt::format("{}: the suction of {} is {:.0f} % of the load at which the perfect shell buckles: a real "
-                       "wall, with dents as deep as it is thick, buckles at about a third of that load. Ask for less, "
-                       "or follow the path (control = \"arc-length\") of a shell with its dents",
-                       named(sucked->said_at, model.name_of(sucked->body)), pressure_text(-value), 100 / factor)}};
+  // The factor multiplies what comes on top of the image.
+  const auto& pressure = std::get<PressureLoad>(sucked->kind);
+  const double imaged = pressure.imaged_at.value_or(0);
+  const double part = pressure.value / (imaged + factor * (pressure.value - imaged));
+  if (!(part > sensitive)) {
+    return {};
+  }
+  return {
+      {Weight::major, "near buckling",
+       fmt::format("{}: the suction of {} is {:.0f} % of the load at which the perfect shell buckles: a real "
+                   "wall, with dents as deep as it is thick, buckles at about a third of that load. Ask for less, "
+                   "or follow the path (control = \"arc-length\") of a shell with its dents",
+                   named(sucked->said_at, model.name_of(sucked->body)), pressure_text(-pressure.value), 100 * part)}};
 }
 
 }  // namespace tunica

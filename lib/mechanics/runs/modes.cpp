@@ -256,7 +256,8 @@ double small_shift(const ShellSystem& system) {
 struct RestingState {
   Configuration configuration;
   BlockMatrix stiffness;
-  VectorX external;  ///< forces of the loads; of size zero: none act
+  VectorX external;           ///< forces of the loads; of size zero: none act
+  std::vector<Snap> snaps{};  ///< on the way there
 };
 
 /// Rigid motions against which nothing works: they have no frequency.
@@ -306,7 +307,7 @@ std::vector<VectorX> idle_rigid_modes(const ShellSystem& system, const RestingSt
 RestingState rest_of(ShellSystem& system, const RunSettings& settings, const FrequencyRun& run) {
   const Model& model = *system.model;
   RestingState rest{reference_configuration(system), system.pattern, {}};
-  auto& [configuration, stiffness, external] = rest;
+  auto& [configuration, stiffness, external, snaps] = rest;
   if (model.loads.empty() && system.prescribed.empty()) {
     linear_stiffness(system, stiffness);
     return rest;
@@ -332,7 +333,7 @@ RestingState rest_of(ShellSystem& system, const RunSettings& settings, const Fre
     exact.converge = std::min(settings.converge, 1e-12);
   }
   State last;
-  run_static(system, exact, run.preload, [&](const State& state) { last = state; }, {}, {});
+  snaps = run_static(system, exact, run.preload, [&](const State& state) { last = state; }, {}, {}).snaps;
   configuration.displacement = last.displacement;
   for (std::size_t i = 0; i < system.node_count(); ++i) {
     configuration.rotation[i] = exponential(last.rotation[i]);
@@ -352,6 +353,7 @@ Summary run_frequencies(ShellSystem& system, const RunSettings& settings, const 
   Summary summary;
   on_state(reference_state(system, summary));
   RestingState rest = rest_of(system, settings, run);
+  summary.snaps = rest.snaps;
   advance(progress, 0.3);
   release_rigid_motion_supports(system);
   const FreeMask free = free_freedoms(system);

@@ -119,11 +119,8 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
     result.error = cg.error;
     return result;
   }
-  if (!direct_) {
-    direct_.emplace(matrix, free_);
-  }
   if (!same_matrix) {
-    factored_ = direct_->factor(matrix);
+    factor(matrix);
   }
   if (!factored_.regular) {
     return result;
@@ -142,16 +139,19 @@ TangentSolver::Result TangentSolver::solve(BlockMatrix& matrix, const VectorX& b
   return result;
 }
 
-bool TangentSolver::is_positive_definite(const BlockMatrix& matrix) const {
-  constexpr double golden_angle = 2.39996323;  // no two components are alike
-  VectorX any(narrow<Eigen::Index>(free_.size()));
-  for (Eigen::Index i = 0; i < any.size(); ++i) {
-    any[i] = std::cos(golden_angle * real(i));
+bool TangentSolver::is_positive_definite(const BlockMatrix& matrix) {
+  if (freedom_count() == 0) {
+    return true;
   }
-  mask(free_, any);
-  VectorX ignored = VectorX::Zero(any.size());
-  return !conjugate_gradients(matrix, free_, any, {settings_.cg_tolerance, settings_.cg_iterations, false}, ignored)
-              .negative_curvature;
+  factor(matrix);
+  return factored_.regular && factored_.negative_pivots == pressures_;
+}
+
+void TangentSolver::factor(const BlockMatrix& matrix) {
+  if (!direct_) {
+    direct_.emplace(matrix, free_);
+  }
+  factored_ = direct_->factor(matrix);
 }
 
 Balance balance_at(const ShellSystem& system, const Instant& at, Forces& forces, BlockMatrix* tangent) {

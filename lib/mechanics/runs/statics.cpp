@@ -43,21 +43,20 @@ constexpr double beyond_the_limit = 4;
 /// A step whose change is more than this times its linear prediction has left the path: up to a limit point a quadratic
 /// fold gives at most 2.
 constexpr double largest_departure = 3;
-/// A shell that gives way by less than this part of its thickness (root mean square) has branched off its path; more is
-/// a snap.
-constexpr double largest_branch = 0.25;
+/// Where nothing tells of a state of balance that is not stable, this part of the thickness tells a snap from
+/// iterations that came to nothing.
+constexpr double visible = 0.25;
 /// A configuration is near where Newton's method needs no more from there.
 constexpr std::size_t near_iterations = 5;
-/// Part of the thickness by which a shell is pushed off a path that it may leave.
-constexpr double nudge = 0.01;
 
 /// One load step to equilibrium, bodies held by their rigid motions included: their mean displacement and rotation are
 /// taken out, and equilibrium found again, until both hold.
 class LoadStep {
 public:
   LoadStep(ShellSystem& system, const RunSettings& settings)
-      : system_(system), model_(*system.model), settings_(settings), matrix_(system.pattern) {
+      : system_(system), model_(*system.model), settings_(settings), by_factor_(settings), matrix_(system.pattern) {
     solver_.emplace(system, settings);
+    by_factor_.solver = Solver::direct;
   }
 
   NewtonResult run(double factor, double previous_factor, Configuration& configuration) {
@@ -72,10 +71,9 @@ public:
     constexpr std::size_t fewest_iterations = 2;
     NewtonResult result =
         newton(system_, settings_, *solver_, balance, held, matrix_, configuration, likely_at_rest, fewest_iterations);
-    // Without an iteration no tangent was made; of what slides it is unsymmetric, and says nothing.
-    const bool asks = result.converged && result.iterations > 0 && !system_.law().slides();
-    if (asks && settings_.solver == Solver::cg && !settings_.cg_fixed_count) {
-      result.stable = result.stable && solver_->is_positive_definite(matrix_);
+    // Without an iteration no tangent was made.
+    if (result.converged && result.iterations > 0 && settings_.solver == Solver::cg && !settings_.cg_fixed_count) {
+      result.stable = result.stable && is_positive();
     }
     const VectorX still = VectorX::Zero(held.size());
     for (int round = 0; round < 8 && result.converged; ++round) {
@@ -108,25 +106,41 @@ public:
     return result;
   }
 
-  /// Where the path has lost its stability: moves what is prescribed, pushes the shell off it, and lets it creep to
-  /// where it can rest.
-  SettleResult let_go(double factor, double previous_factor, double thickness, Configuration& configuration) {
+  /// Where the path has lost its stability: moves what is prescribed, and lets the shell creep to where it can rest.
+  /// Errors: MemoryError: with the cg solver, a factor does not fit into the memory.
+  SettleResult let_go(double factor, double previous_factor, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, c, factor, forces_, tangent, predicted);
     };
     begin_contact(system_, settings_, factor, factor, configuration, solver_, matrix_);
     advance_configuration(
         system_, prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor), configuration);
-    advance_configuration(system_,
-                          nudge * thickness * weakest_direction(system_, *solver_, balance, matrix_, configuration),
-                          configuration);
-    return settle(system_, settings_, *solver_, balance, matrix_, configuration);
+    if (settings_.solver != Solver::cg) {
+      return settle(system_, settings_, *solver_, balance, matrix_, configuration);
+    }
+    TangentSolver solver(system_, by_factor_);  // iterations do not come to rest on tangents that are hardly positive
+    return settle(system_, by_factor_, solver, balance, matrix_, configuration);
+  }
+
+  /// Whether nothing but the load need hold the shell in a state.
+  [[nodiscard]] bool is_stable(double factor, const Configuration& configuration) {
+    return static_balance(system_, configuration, factor, forces_, &matrix_).valid && is_positive();
   }
 
   [[nodiscard]] std::size_t freedom_count() const { return solver_->freedom_count(); }
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
 
 private:
+  /// Of the last tangent. One of what slides is unsymmetric, and says nothing; nor does one whose factor does not fit
+  /// into the memory.
+  [[nodiscard]] bool is_positive() {
+    try {
+      return system_.law().slides() || solver_->is_positive_definite(matrix_);
+    } catch (const MemoryError&) {
+      return true;
+    }
+  }
+
   void require_balance(const Configuration& configuration, double factor) {
     static_balance(system_, configuration, factor, forces_, nullptr);
     for (const Piece& piece : system_.pieces) {
@@ -153,19 +167,11 @@ private:
   ShellSystem& system_;
   const Model& model_;
   const RunSettings& settings_;
+  RunSettings by_factor_;  ///< the same with the direct solver
   std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   Forces forces_;
 };
-
-/// Root mean square over the nodes.
-double distance(const Configuration& a, const Configuration& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.displacement.size(); ++i) {
-    sum += (a.displacement[i] - b.displacement[i]).squaredNorm();
-  }
-  return std::sqrt(sum / real(a.displacement.size()));
-}
 
 double largest_distance(const Configuration& a, const Configuration& b) {
   double largest = 0;
@@ -194,7 +200,7 @@ Failure why(const NewtonResult& result, const SettleResult& let_go, bool prescri
     return {"no state found that bodies can reach without passing through each other", "take more load steps"};
   }
   if (let_go.ran_away) {
-    return {none, limit + ": beyond it there is no equilibrium, the shell yields without bound"};
+    return {none, limit + ": no equilibrium was found beyond it, the shell yields without bound"};
   }
   if (!result.stable || let_go.lost_stability) {
     return {none,
@@ -240,7 +246,12 @@ private:
         return state_of(*found);
       }
     }
-    return state_of(reach(target));
+    const NewtonResult reached = reach(target);
+    // Who asks for a number of iterations gets it, and what they have led to.
+    if (is_last() && (settings_.cg_fixed_count || settings_.newton_max == 1)) {
+      summary_.ends_unstable = !step_.is_stable(factor_, configuration_);
+    }
+    return state_of(reached);
   }
 
   [[nodiscard]] Checkpoint checkpoint() const override {
@@ -285,6 +296,7 @@ private:
     NewtonResult result;
     std::size_t iterations = 0;
     std::size_t cg_iterations = 0;
+    double leap = 1;  // by which the next time goes farther, where the shell was let go again and again
     while (factor_ != target) {
       const double before = factor_;
       const double end = turns_.next(factor_, target, smallest_turn * step);
@@ -299,6 +311,7 @@ private:
         accept_contact(system_, configuration_);
         factor_ = next;
         increment_ *= 2;
+        leap = std::max(leap / 2, 1.0);
         continue;
       }
       tell_slow_step(iterations, fmt::format("load factor {:.6g} of {:.6g}", factor_, run_.load_factors.back()),
@@ -313,12 +326,14 @@ private:
         increment_ = step;
         continue;
       }
-      const SettleResult settled = leave_path(beyond_the_limit * smallest, end, result);
+      const double past = leap * beyond_the_limit * smallest;
+      const SettleResult settled = leave_path(past, end, result);
       iterations += settled.iterations;
       cg_iterations += settled.cg_iterations;
       result.residual = settled.residual;
       result.converged = true;
-      increment_ = beyond_the_limit * smallest;
+      increment_ = past;
+      leap *= 2;
     }
     result.iterations = iterations;
     result.cg_iterations = cg_iterations;
@@ -357,8 +372,13 @@ private:
     constexpr double more = 16;
     const double beyond = std::min(end, factor_ + past);
     Configuration attempt = configuration_;
-    const SettleResult settled = step_.let_go(beyond, factor_, thickness_, attempt);
     NewtonResult told = failed;
+    SettleResult settled;
+    try {
+      settled = step_.let_go(beyond, factor_, attempt);
+    } catch (const MemoryError&) {
+      fail(told, {}, "", place_of_yielding(attempt));
+    }
     told.apart = failed.apart && (!settled.settled || is_apart(attempt));
     if (!settled.settled && !settled.ran_away && !system_.contact && beyond < end) {
       return leave_path(more * past, end, failed);
@@ -366,14 +386,25 @@ private:
     if (!settled.settled || !told.apart) {
       fail(told, settled, settled.ran_away ? loose_body(attempt) : "", place_of_yielding(attempt));
     }
+    const double moved = largest_distance(attempt, configuration_);
     const bool unstable = !failed.stable || settled.lost_stability;
-    if (unstable && distance(attempt, configuration_) > largest_branch * thickness_) {
-      summary_.snaps.push_back({factor_, largest_distance(attempt, configuration_)});
+    if (settled.pushed_off || (unstable && moved > visible * thickness_)) {
+      note_snap(moved);
     }
     configuration_ = std::move(attempt);
     accept_contact(system_, configuration_);
     factor_ = beyond;
     return settled;
+  }
+
+  /// Where a path has branched off, the stability of what branches is lost and found again while the load grows on: all
+  /// that is one event.
+  void note_snap(double distance) {
+    std::vector<Snap>& snaps = summary_.snaps;
+    if (snaps.empty() || factor_ > snaps.back().load_factor + smallest_of_step * run_.load_factors.back()) {
+      snaps.push_back({factor_, 0});
+    }
+    snaps.back().distance = std::max(snaps.back().distance, distance);
   }
 
   /// Whose node has moved farthest, if its supports leave a rigid motion free.

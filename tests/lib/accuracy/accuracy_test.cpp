@@ -195,6 +195,36 @@ TEST(Accuracy, WithinABoundOfTimeARunEndsWithWhatThereIs) {
   EXPECT_EQ(found.system->model().shells[0].mesh.triangles.size(), 3072U);
 }
 
+/// A column that buckles under its own weight, beyond 7.837 E I / L^3: levels that come to the same state agree.
+TEST(Accuracy, ABuckledColumnIsWithinWhatIsClaimed) {
+  constexpr double young = 1000, thickness = 0.1, length = 10;
+  const double critical = 7.837 * young * std::pow(thickness / length, 3) / 12;
+  const ModelOf column = [&](std::vector<ShellBody> bodies) {
+    Model model;
+    model.shells = std::move(bodies);
+    benchmarks::hold(
+        model, [](const Vec3& p) { return p.x() < 1e-9; }, "xyz", "xyz");
+    model.loads.push_back({0, AreaLoad{Vec3(-1.3 * critical, 0, 0)}, {}});
+    return model;
+  };
+  const benchmarks::Grid grid = benchmarks::make_grid(8, 1, [](double u, double v) { return Vec3(length * u, v, 0); });
+  std::vector<ShellBody> body{benchmarks::flat_body(grid.mesh, young, 0, thickness)};
+  body.front().mesh.normals.assign(body.front().mesh.vertices.size(), Vec3::UnitZ());
+  body.front().curved = true;
+  body.front().rest = Rest::curved;
+  const auto found = [&](double within) {
+    return solve_within(body, {nullptr}, {within, Quantity::displacement}, at_rest(), column);
+  };
+  const Accuracy coarse = found(0.05);
+  EXPECT_TRUE(coarse.reasons.empty());
+  EXPECT_EQ(coarse.summary.snaps.size(), 1U);
+  const Accuracy exact = found(0.002);
+  EXPECT_EQ(exact.summary.snaps.size(), 1U);  // of levels that begin from the one before, too
+  const double fine = exact.levels.back().value;
+  EXPECT_GT(fine, 1);
+  EXPECT_NEAR(coarse.levels.back().value, fine, 0.05 * fine);
+}
+
 TEST(Accuracy, TooFewShellsForAnEstimateAreSaid) {
   const Accuracy found = Sphere().solved({0.02, Quantity::displacement, 500});
   EXPECT_FALSE(found.estimate);

@@ -437,29 +437,128 @@ TEST(Buckling, Columns) {
   EXPECT_GT(std::log2(errors[0] / errors[2]) / 2, 1.8);
 }
 
-/// Straight, it is in balance after one iteration, whose tangent is that of the column without load.
-TEST(Buckling, AColumnBeyondItsLoadIsNoStateOfRest) {
+/// Clamped at one end, a dead force of so many critical ones at the other.
+Model cantilever_column(double part) {
   constexpr std::size_t n = 16;
   const Grid grid = make_grid(n, 1, [](double u, double v) { return Vec3(10 * u, v, 0); });
   const double critical = pi * pi * 1000 * 1e-3 / 12 / 400;
+  Model model;
+  model.shells.push_back(flat_body(grid.mesh, 1000, 0, 0.1));
+  hold(
+      model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
+  model.loads.push_back({0, EdgeLoad{{{grid.node(n, 0), grid.node(n, 1)}}, Vec3(-part * critical, 0, 0)}, {}});
+  return model;
+}
+
+/// mm, by which its end moves to the side.
+double moved_aside(double part, const RunSettings& settings, Summary* summary = nullptr) {
+  double aside = 0;
+  const Summary ended = solve(cantilever_column(part), settings,
+                              [&](const State& state) { aside = std::abs(state.displacement.back().z()); });
+  if (summary != nullptr) {
+    *summary = ended;
+  }
+  return aside;
+}
+
+/// Straight, it is in balance after one iteration, whose tangent is that of the column without load. Deflection of the
+/// elastica at 1.5 times the load: Timoshenko, Gere, "Theory of elastic stability", 2.7.
+TEST(Buckling, AColumnBeyondItsLoadIsNoStateOfRest) {
   for (const Solver solver : {Solver::direct, Solver::cg}) {
-    for (const double part : {0.9, 1.5}) {
-      Model model;
-      model.shells.push_back(flat_body(grid.mesh, 1000, 0, 0.1));
-      hold(
-          model, [](const Vec3& p) { return p.x() < eps; }, "xyz", "xyz");
-      model.loads.push_back({0, EdgeLoad{{{grid.node(n, 0), grid.node(n, 1)}}, Vec3(-part * critical, 0, 0)}, {}});
-      RunSettings settings;
-      settings.kind = StaticRun{false, {1}};
+    for (const double tolerance : {1e-8, 0.05, 0.5}) {  // of cg
+      RunSettings settings = nonlinear_run({1});
       settings.solver = solver;
-      double aside = 0;
-      try {
-        solve(model, settings, [&](const State& state) { aside = std::abs(state.displacement.back().z()); });
-      } catch (const RequirementError&) {
-        aside = 10;  // said to have no equilibrium
-      }
-      EXPECT_EQ(aside > 1, part > 1) << aside;
+      settings.cg_tolerance = tolerance;
+      EXPECT_LT(moved_aside(0.9, settings), 1e-6) << tolerance;
+      EXPECT_NEAR(moved_aside(1.5, settings), 7.9, 0.1) << tolerance;
     }
+  }
+}
+
+TEST(Buckling, WhatAColumnComesToDependsOnNoStepsAndNoTolerance) {
+  const double reference = moved_aside(1.5, nonlinear_run({1}));
+  for (const double first : {0.5, 2.0 / 3, 0.9}) {  // the second is critical
+    EXPECT_NEAR(moved_aside(1.5, nonlinear_run({first, 1})), reference, 1e-5) << first;
+  }
+  for (const double converge : {1e-3, 1e-5, 1e-10}) {
+    RunSettings settings = nonlinear_run({1});
+    settings.converge = converge;
+    EXPECT_NEAR(moved_aside(1.5, settings), reference, converge * reference + 1e-4) << converge;
+  }
+}
+
+/// Just beyond, w = L sqrt(8 (P / Pcr - 1)) 2 / pi to the first order.
+TEST(Buckling, JustBeyondItsLoadAColumnRestsAside) {
+  const double critical = factors(cantilever_column(1), 1).front();
+  for (const double beyond : {1e-3, 4e-3}) {  // the column is shorter by 2e-5 then
+    const double elastica = 10 * std::sqrt(8 * beyond) * 2 / pi;
+    EXPECT_NEAR(moved_aside(critical * (1 + beyond), nonlinear_run({1})) / elastica, 1, 0.05) << beyond;
+  }
+}
+
+TEST(Buckling, IsToldOnceHoweverFarItGoesAndInFrequenciesToo) {
+  for (const double part : {1.05, 1.5, 3.0}) {
+    Summary summary;
+    (void)moved_aside(part, nonlinear_run({1}), &summary);
+    ASSERT_EQ(summary.snaps.size(), 1U) << part;
+    EXPECT_NEAR(summary.snaps[0].load_factor * part, 1, 2e-3);
+  }
+  Model column = cantilever_column(1.3);
+  column.shells[0].material.density = 1e-9;
+  RunSettings settings;
+  settings.kind = FrequencyRun{2, StaticRun{false, {1}}};
+  EXPECT_EQ(solve(column, settings, [](const State&) {}).snaps.size(), 1U);
+}
+
+/// A simply supported plate that is shortened: it bulges by less than a quarter of its thickness where it leaves its
+/// path.
+TEST(Buckling, AShortBulgeOfAPlateIsToldToo) {
+  Model model = square_plate(12, 10, 0.1, Diagonals::alternating);
+  hold(model, on_edge, "z", "");
+  hold(
+      model, [](const Vec3& p) { return p.x() < eps; }, "x", "");
+  hold(
+      model, [](const Vec3& p) { return p.norm() < eps; }, "y", "");
+  hold(
+      model, [](const Vec3& p) { return p.x() > 10 - eps; }, "x", "");
+  model.fixes.back().displacement = Vec3(-10, 0, 0);
+  const double critical = factors(model, 1)[0];
+  for (const double part : {0.9, 3.0}) {
+    model.fixes.back().displacement = Vec3(-10 * critical * part, 0, 0);
+    const Summary summary = solve(model, nonlinear_run({1}), [](const State&) {});
+    EXPECT_EQ(summary.snaps.size(), part > 1 ? 1U : 0U) << part;
+  }
+}
+
+TEST(Buckling, IterationsThatAreCountedEndUnstableAndSaySo) {
+  RunSettings one = nonlinear_run({1});
+  one.newton_max = 1;
+  RunSettings few = nonlinear_run({1});
+  few.solver = Solver::cg;
+  few.cg_iterations = 200;
+  few.cg_fixed_count = true;
+  few.newton_max = 1;
+  for (const RunSettings& settings : {one, few}) {
+    for (const double part : {0.9, 1.5}) {
+      Summary summary;
+      (void)moved_aside(part, settings, &summary);
+      EXPECT_EQ(summary.ends_unstable, part > 1);
+    }
+  }
+}
+
+TEST(Buckling, APathByArcLengthSaysWhereOthersLeaveItAndThatItEndsUnstable) {
+  const double critical = factors(cantilever_column(1), 1).front() / 1.5;
+  for (const double first : {1.0, 0.4, 0.1}) {
+    RunSettings settings;
+    settings.kind = ArcLengthRun{100, first, 1, std::nullopt};
+    Summary summary;
+    EXPECT_LT(moved_aside(1.5, settings, &summary), 1e-6);
+    ASSERT_EQ(summary.branch_factors.size(), 1U) << first;
+    EXPECT_NEAR(summary.branch_factors[0], critical, 1e-3 * critical) << first;
+    EXPECT_TRUE(summary.ends_unstable);
+    (void)moved_aside(0.9, settings, &summary);
+    EXPECT_FALSE(summary.ends_unstable);
   }
 }
 

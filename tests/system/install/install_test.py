@@ -209,7 +209,7 @@ class Installed(unittest.TestCase):
             self.assertEqual((done.returncode, done.stderr), (0, ""), name)
             return done.stdout
 
-        self.assertRegex(run("whole_chain"), r"^\d+ triangles, \d+ shells, certainly within 0\.\d+ mm; membrane stress 0\.02\d+ MPa, ")
+        self.assertRegex(run("whole_chain"), r"^\d+ triangles, \d+ shells, certainly within 0\.\d+ mm; membrane stress 0\.02\d+ MPa \(mesh: \+- 0\.\d+ %\), ")
         self.assertIn("by Laplace's law 0.017", run("wall_stress"))
         for name, height in (("a", 0), ("b", 2)):
             (self.prefix / f"{name}.off").write_text(f"OFF\n3 1 0\n0 0 {height}\n1 0 {height}\n0 1 {height}\n3 0 1 2\n")

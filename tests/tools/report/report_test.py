@@ -752,6 +752,7 @@ class Errors(ReportTest):
     def test_verify_names_what_differs(self):
         folder = self.copy("aneurysm")
         self.report("--verify")
+        self.assertIn("verified: every file is what its report says", self.done.stdout)
         with open(folder / "shell.ply", "ab") as file:
             file.write(b"x")
         (folder / "coarse.ply").unlink()  # where the case was made it is still there

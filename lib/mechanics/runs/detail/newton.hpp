@@ -33,9 +33,10 @@ public:
   /// @param same_matrix  the values are those of the last call: the factor at hand is used again
   Result solve(BlockMatrix& matrix, const VectorX& b, VectorX& x, bool same_matrix = false);
 
-  /// Whether the cg solver finds that the last matrix has no negative curvature: a right-hand side of some symmetry
-  /// does not see the modes of another, one that has a part of every mode does. Cost: one more solve.
-  bool is_positive_definite(const BlockMatrix& matrix) const;
+  /// Whether the symmetric part of a matrix is positive definite on the free freedoms, by a factorisation, with the cg
+  /// solver too: its iterations see the modes that the load drives, to the digits that they are asked for.
+  /// Errors: MemoryError: the factor does not fit into the memory.
+  bool is_positive_definite(const BlockMatrix& matrix);
 
   /// Whether the direct solver tells the error of its solutions, for one more solve each.
   void tell_direct_error(bool tell) { tell_direct_error_ = tell; }
@@ -45,11 +46,13 @@ public:
   [[nodiscard]] std::size_t freedom_count() const;
 
 private:
+  void factor(const BlockMatrix& matrix);
+
   const RunSettings& settings_;
   FreeMask free_;
   std::optional<DirectSolver> direct_;
-  DirectSolver::Factored factored_;
-  std::size_t pressures_ = 0;  ///< each makes a pivot negative
+  DirectSolver::Factored factored_;  ///< of the last matrix
+  std::size_t pressures_ = 0;        ///< each makes a pivot negative
   bool tell_direct_error_ = false;
 };
 

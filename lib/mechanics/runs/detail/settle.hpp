@@ -9,23 +9,21 @@ struct SettleResult {
   bool ran_away = false;  ///< the shell left every bound: some displacement passed the size of the model
   /// A tangent on the way was not positive definite, however little viscosity is left.
   bool lost_stability = false;
-  double residual = 0;  ///< relative
+  bool pushed_off = false;  ///< a state of balance on the way was not stable
+  double residual = 0;      ///< relative
   std::size_t iterations = 0;
   std::size_t cg_iterations = 0;
 };
 
 /// Lets a configuration, which is changed, creep downhill until it rests: a stable equilibrium of the same load, near
 /// or far, or none. For states that Newton's method cannot reach because the path to them loses its stability. How:
-/// pseudo-transient continuation, implicit Euler steps of a gradient flow with a viscosity that falls while they lead
-/// downhill, and rises where the tangent is not positive definite; it never stops at an unstable equilibrium. Source:
-/// Kelley, Keyes 1998, "Convergence analysis of pseudo-transient continuation". Cost: one or two factorisations per
-/// iteration; from ten to a few hundred iterations.
+/// implicit Euler steps of a gradient flow, each solved by Newton's method, with a viscosity that falls while they are
+/// found, and rises where the tangent is not positive definite; off an unstable equilibrium it is pushed along its
+/// weakest direction. Source: Kelley, Keyes 1998, "Convergence analysis of pseudo-transient continuation"; Rockafellar
+/// 1976, "Monotone operators and the proximal point algorithm" (steps that are solved may be long where energy is
+/// stiff across the valley). Cost: from ten to a few hundred factorisations, and some ten for each state that it is
+/// pushed off. Errors: MemoryError: a factor does not fit into the memory.
 SettleResult settle(const ShellSystem& system, const RunSettings& settings, TangentSolver& solver,
                     const BalanceFunction& balance, BlockMatrix& matrix, Configuration& configuration);
-
-/// The direction in which a configuration is least stable: displacements and spins (6 per node), the largest
-/// displacement 1 mm. Zero where the tangent cannot be factored.
-VectorX weakest_direction(const ShellSystem& system, TangentSolver& solver, const BalanceFunction& balance,
-                          BlockMatrix& matrix, const Configuration& configuration);
 
 }  // namespace tunica
