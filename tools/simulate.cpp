@@ -48,7 +48,6 @@ void ask(cli::Tool& tool, const Arguments& a, bool goes_on, chain::SimulateSetti
   if (a.run.check && a.picture.out) {
     throw UsageError("--check and --picture contradict each other: a picture needs a result");
   }
-  settings.picture = a.picture.out;
   settings.look = a.picture.options(settings.scene.run);
   a.accuracy.ask(tool.arguments(), settings.scene);
   settings.target = a.accuracy.target;

@@ -401,7 +401,7 @@ Summary solve_and_record(const System& system, const SimulateSettings& settings,
                          Recorder& record, Stages& stage, const Context& context) {
   const std::string subject = subject_of(settings);
   Resumption resumption;
-  if (settings.resume) {
+  if (settings.resume && journal) {
     const std::string part = settings.resume->string();
     resumption.from = journal->replay(system.model(), std::ref(record));
     context.note(resumption.from ? fmt::format("{}: goes on after step {}", part, resumption.from->summary.steps)

@@ -35,7 +35,7 @@ struct Drawing {
 struct SimulateSettings {
   Scene scene;
   bool check = false;                           ///< only whether it can be run
-  std::filesystem::path out;                    ///< the result; empty: no file is written
+  std::filesystem::path out;                    ///< the result; empty: it, its journal and its exports are not written
   std::vector<std::filesystem::path> inputs;    ///< that have been read, the first in messages; none: all is in memory
   std::optional<std::filesystem::path> resume;  ///< the partial result that goes on
   Drawing drawing;

@@ -24,14 +24,6 @@ constexpr int most_cuts_of_jumps = 20;  // likewise: surfaces come near each oth
 
 bool uses_cg(const RunSettings& settings) { return settings.solver == Solver::cg; }
 
-double largest_shift(const VectorX& increment) {
-  double largest = 0;
-  for (Eigen::Index i = 0; i < increment.size(); i += 6) {
-    largest = std::max(largest, increment.segment<3>(i).squaredNorm());
-  }
-  return std::sqrt(largest);
-}
-
 /// Where forces jump, as at the next face that something touches, a state of rest may lie on the kink, and Newton's
 /// method swings from one side to the other. There it is at rest where some mean of the sides' unbalanced forces
 /// vanishes. Source: Goldstein 1977, "Optimization of Lipschitz continuous functions" (the convex hull of nearby
@@ -166,6 +158,14 @@ Balance balance_at(const ShellSystem& system, const Instant& at, Forces& forces,
   balance.floor = round_off(system, at.configuration) + forces.noise;
   condense(system, at.configuration, balance.unbalanced, tangent);
   return balance;
+}
+
+double largest_shift(const VectorX& increment) {
+  double largest = 0;
+  for (Eigen::Index i = 0; i < increment.size(); i += 6) {
+    largest = std::max(largest, increment.segment<3>(i).squaredNorm());
+  }
+  return std::sqrt(largest);
 }
 
 double increment_size(const ShellSystem& system, const VectorX& increment) {

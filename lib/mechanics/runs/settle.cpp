@@ -67,12 +67,8 @@ VectorX change_of(const Configuration& from, const Configuration& to) {
 
 /// Shortens an increment that turns or moves a node too far for one step.
 void limit(const ShellSystem& system, VectorX& increment) {
-  double turn = 0;
-  double move = 0;
-  for (Eigen::Index i = 0; i < increment.size(); i += 6) {
-    move = std::max(move, increment.segment<3>(i).norm());
-    turn = std::max(turn, increment.segment<3>(i + 3).norm());
-  }
+  const double turn = largest_rotation(system, increment);
+  const double move = largest_shift(increment);
   increment *= std::min(
       {1.0, largest_settling_turn / std::max(turn, largest_settling_turn), system.length / std::max(move, 1e-300)});
 }
@@ -165,10 +161,7 @@ private:
       if (!solver_.solve(shifted, right, x, true).solved) {
         return false;
       }
-      double largest = 0;
-      for (Eigen::Index i = 0; i < x.size(); i += 6) {
-        largest = std::max(largest, x.segment<3>(i).norm());
-      }
+      const double largest = largest_shift(x);
       if (!(largest > 0)) {
         return false;
       }

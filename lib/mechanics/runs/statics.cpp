@@ -45,7 +45,7 @@ constexpr double beyond_the_limit = 4;
 constexpr double largest_departure = 3;
 /// Where nothing tells of a state of balance that is not stable, this part of the thickness tells a snap from
 /// iterations that came to nothing.
-constexpr double visible = 0.25;
+constexpr double visible_jump = 0.25;
 /// A configuration is near where Newton's method needs no more from there.
 constexpr std::size_t near_iterations = 5;
 
@@ -327,7 +327,7 @@ private:
         continue;
       }
       const double past = leap * beyond_the_limit * smallest;
-      const SettleResult settled = leave_path(past, end, result);
+      const SettleResult settled = leave_path(std::min(end, factor_ + past), result);
       iterations += settled.iterations;
       cg_iterations += settled.cg_iterations;
       result.residual = settled.residual;
@@ -365,12 +365,8 @@ private:
     return (result.converged || (result.valid && one_linearisation)) && result.stable && !left_the_path;
   }
 
-  /// From where the path breaks off to the next state of rest, at a load factor beyond. Just beyond a branch point next
-  /// to nothing drives the shell away: then more load does. Errors: RequirementError: there is none up to `end`, where
-  /// loads may turn.
-  SettleResult leave_path(double past, double end, const NewtonResult& failed) {
-    constexpr double more = 16;
-    const double beyond = std::min(end, factor_ + past);
+  /// From where the path breaks off to the next state of rest, at a load factor beyond. Errors: RequirementError: none.
+  SettleResult leave_path(double beyond, const NewtonResult& failed) {
     Configuration attempt = configuration_;
     NewtonResult told = failed;
     SettleResult settled;
@@ -380,15 +376,12 @@ private:
       fail(told, {}, "", place_of_yielding(attempt));
     }
     told.apart = failed.apart && (!settled.settled || is_apart(attempt));
-    if (!settled.settled && !settled.ran_away && !system_.contact && beyond < end) {
-      return leave_path(more * past, end, failed);
-    }
     if (!settled.settled || !told.apart) {
       fail(told, settled, settled.ran_away ? loose_body(attempt) : "", place_of_yielding(attempt));
     }
     const double moved = largest_distance(attempt, configuration_);
     const bool unstable = !failed.stable || settled.lost_stability;
-    if (settled.pushed_off || (unstable && moved > visible * thickness_)) {
+    if (settled.pushed_off || (unstable && moved > visible_jump * thickness_)) {
       note_snap(moved);
     }
     configuration_ = std::move(attempt);

@@ -28,8 +28,7 @@ constexpr double elsewhere = 0.1;  // a state of rest farther from the image is 
 constexpr std::size_t most_iterations = 40;
 constexpr std::size_t patience = 8;       // iterations in a row that come no nearer
 constexpr std::size_t iterates_kept = 5;  // iterates that the acceleration combines
-constexpr double step_share =
-    0.5;  // of the residual that they leave: waves as short as the shells are overshot by more
+constexpr double step_share = 0.5;        // of the residual they leave: more overshoots waves as short as the shells
 constexpr double smallest_part = 1.0 / 32;
 constexpr std::string_view key = "imaged_at";
 

@@ -510,10 +510,9 @@ TEST(Buckling, IsToldOnceHoweverFarItGoesAndInFrequenciesToo) {
   EXPECT_EQ(solve(column, settings, [](const State&) {}).snaps.size(), 1U);
 }
 
-/// A simply supported plate that is shortened: it bulges by less than a quarter of its thickness where it leaves its
-/// path.
-TEST(Buckling, AShortBulgeOfAPlateIsToldToo) {
-  Model model = square_plate(12, 10, 0.1, Diagonals::alternating);
+/// Simply supported, 10 mm wide, shortened along x between its supports, free to widen.
+Model shortened_plate(std::size_t n, double thickness, double by) {
+  Model model = square_plate(n, 10, thickness, Diagonals::alternating);
   hold(model, on_edge, "z", "");
   hold(
       model, [](const Vec3& p) { return p.x() < eps; }, "x", "");
@@ -521,7 +520,13 @@ TEST(Buckling, AShortBulgeOfAPlateIsToldToo) {
       model, [](const Vec3& p) { return p.norm() < eps; }, "y", "");
   hold(
       model, [](const Vec3& p) { return p.x() > 10 - eps; }, "x", "");
-  model.fixes.back().displacement = Vec3(-10, 0, 0);
+  model.fixes.back().displacement = Vec3(-by, 0, 0);
+  return model;
+}
+
+/// It bulges by less than a quarter of its thickness where it leaves its path.
+TEST(Buckling, AShortBulgeOfAPlateIsToldToo) {
+  Model model = shortened_plate(12, 0.1, 10);
   const double critical = factors(model, 1)[0];
   for (const double part : {0.9, 3.0}) {
     model.fixes.back().displacement = Vec3(-10 * critical * part, 0, 0);
@@ -564,18 +569,9 @@ TEST(Buckling, APathByArcLengthSaysWhereOthersLeaveItAndThatItEndsUnstable) {
 
 TEST(Buckling, PlatesByForcesAndByPrescribedDisplacement) {
   EXPECT_NEAR(factors(pulled_plate(16, -critical_force()), 1)[0], 1, 0.01);
-  // Shortened along x between its supports, free to widen: N = 4 pi^2 D / a^2, strain = N / (E t).
-  Model model = square_plate(16, 10, 0.05, Diagonals::alternating);
-  hold(model, on_edge, "z", "");
-  hold(
-      model, [](const Vec3& p) { return p.x() < eps; }, "x", "");
-  hold(
-      model, [](const Vec3& p) { return p.norm() < eps; }, "y", "");
-  hold(
-      model, [](const Vec3& p) { return p.x() > 10 - eps; }, "x", "");
+  // N = 4 pi^2 D / a^2, strain = N / (E t).
   const double strain = 2 * critical_force() / (1000 * 0.05);
-  model.fixes.back().displacement = Vec3(-10 * strain, 0, 0);
-  EXPECT_NEAR(factors(model, 1)[0], 1, 0.01);
+  EXPECT_NEAR(factors(shortened_plate(16, 0.05, 10 * strain), 1)[0], 1, 0.01);
 }
 
 TEST(Buckling, FactorsScaleWithTheLoad) {

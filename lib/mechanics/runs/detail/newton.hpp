@@ -102,4 +102,7 @@ NewtonResult newton(const ShellSystem& system, const RunSettings& settings, Tang
 /// Size of an increment: root mean square over the nodes of displacements and (mean edge length x) rotations.
 double increment_size(const ShellSystem& system, const VectorX& increment);
 
+/// The farthest that an increment moves a node, mm.
+double largest_shift(const VectorX& increment);
+
 }  // namespace tunica
