@@ -151,7 +151,7 @@ ComparedFiles read_compared(const CompareFiles& files, const CompareSettings& se
                             in_millimetres(files.out.picture_range);
   MeshFile file_a = read_mesh(files.a, files.unit_mm, require_unit);
   MeshFile file_b = read_mesh(files.b, files.unit_mm, require_unit);
-  for (const auto& note : {unit_note(file_a, files.a), unit_note(file_b, files.b)}) {
+  for (const auto& note : {unit_note(file_a, files.a, files.unit_mm), unit_note(file_b, files.b, files.unit_mm)}) {
     if (note) {
       context.warn(*note);
     }

@@ -192,7 +192,7 @@ SurfaceToDecimate read_surface(const std::filesystem::path& path, std::optional<
   SurfaceToDecimate surface{read_mesh(path, unit_mm, in_millimetres), {}};
   MeshFile& file = surface.file;
   require_no_other_unit(file, unit_mm, path);
-  if (const auto note = unit_note(file, path)) {
+  if (const auto note = unit_note(file, path, unit_mm)) {
     context.warn(*note);
   }
   if (repair) {

@@ -4,8 +4,8 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/file/signed_file.hpp"
 #include "tunica/io/mesh/surface_file.hpp"
-#include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/patch/patch_edges.hpp"
+#include "tunica/shell/patch/tessellate_conforming.hpp"
 #include "tunica/surface/distance/hausdorff.hpp"
 #include "tunica/surface/mesh/subdivide.hpp"
 
@@ -51,7 +51,10 @@ ErrorMap map_of_facets(const TriangleMesh& mesh, const ClosestPoint& to, std::si
 
 void write_curved(const std::filesystem::path& path, const ShellMesh& shell, double diagonal, const PlyOptions& ply) {
   constexpr double deviation = 0.8e-5;  // of the diagonal; 1e-5, which is promised, may be taken of either surface
-  write_surface(path, tessellate(shell, deviation * diagonal).mesh, ply);
+  write_surface(path,
+                shell.patch == Patch::watertight ? tessellate_conforming(shell, deviation * diagonal)
+                                                 : tessellate(shell, deviation * diagonal).mesh,
+                ply);
 }
 
 FilesTogether::~FilesTogether() {

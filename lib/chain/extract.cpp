@@ -271,7 +271,9 @@ Extraction extract(SelectedVoxels selected, const ExtractSettings& settings, con
   Extraction found;
   found.name = selected.name;
   VoxelSurface surface = surface_of(subject, std::move(selected), settings, context);
-  found.numbers = measure(surface, voxel_volume, settings);
+  // Of an organ that was cut, what is left of it.
+  const double left = real(count_voxels(surface.mask)) * surface.mask.voxel_volume();
+  found.numbers = measure(surface, settings.cuts.empty() ? voxel_volume : left, settings);
   doubt(subject, surface, found.numbers, inside, settings, context);
   if (other) {
     const FaceDistance thickness =

@@ -49,7 +49,7 @@ struct SurfaceNumbers {
   bool closed = true, manifold = true;
   bool oriented_outward = true;    ///< normals point from inside to outside
   std::optional<double> volume;    ///< mm^3, signed; none where it is open
-  double voxel_volume = 0;         ///< mm^3, of all that was selected
+  double voxel_volume = 0;         ///< mm^3, of all that was selected, or of what cuts leave of it
   double area = 0;                 ///< mm^2
   std::optional<double> diagonal;  ///< mm
   std::optional<StaircaseResult> staircase;

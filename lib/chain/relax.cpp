@@ -82,7 +82,7 @@ void turn_outward(const fs::path& path, TriangleMesh& mesh, const Context& conte
 ReadSurface read_oriented(const fs::path& path, const std::optional<double>& unit_mm, const Context& context) {
   context.reads(path);
   ReadSurface surface{read_mesh(path, unit_mm, true), {}, {}, 0};
-  if (const auto note = unit_note(surface.file, path)) {
+  if (const auto note = unit_note(surface.file, path, unit_mm)) {
     context.warn(*note);
   }
   surface.facts = require_surface(surface.file, path);
@@ -178,7 +178,7 @@ void warn_of_pressure(WallFace which, double face, double middle, long euler, do
     context.warn(
         {Weight::minor, "pressure on the middle",
          fmt::format(
-             "the middle of the wall has {:.2g} times the area of its inner face, and a pressure on these "
+             "the middle of the wall has {:.4g} times the area of its inner face, and a pressure on these "
              "shells acts on the middle: stress is larger by as much than by a pressure inside; divide "
              "the pressure (--pressure, --imaged-at; PRESSURE, IMAGED_AT) by {:.4g}, unless it is divided already",
              middle / inner, middle / inner)});
@@ -459,6 +459,9 @@ RelaxSurfaces read_relaxed(const RelaxFiles& files, const RelaxSettings& setting
   read.coarse_name = files.coarse.string();
   read.target_name = files.target.string();
   read.ply.comments = voxel_comments(voxel_comments(surface.file).empty() ? start.file : surface.file);
+  if (settings.face) {
+    read.ply.comments.emplace_back(middle_of_wall);
+  }
   read.ply.comments.push_back("made by " + context.made_by());
   read.ply.space = common_space(start.file, files.coarse, surface.file, files.target);
   read.ply.overwrite = context.overwrite;

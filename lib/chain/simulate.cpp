@@ -9,6 +9,7 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
+#include "tunica/io/mesh/voxel_comments.hpp"
 #include "tunica/io/result/page_file.hpp"
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"
@@ -229,7 +230,8 @@ private:
 bool require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path, bool needed,
                         const Context& context) {
   constexpr std::size_t facets_per_shell = 2;
-  constexpr double farthest_mean = 0.02;  // of the diagonal
+  constexpr double farthest_mean = 0.02;       // of the diagonal
+  constexpr double farthest_of_shells = 0.25;  // of the root of their mean area: a few follow a surface no better
   const std::size_t facets = target.mesh().triangles.size();
   const bool is_finer = facets >= facets_per_shell * shell.triangles.size();
   if (!is_finer && needed) {
@@ -237,7 +239,10 @@ bool require_own_target(const ShellMesh& shell, const Target& target, const fs::
         fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
                     path.string(), facets, shell.triangles.size()));
   }
-  if (const double mean = mean_distance(shell, target).first; mean > farthest_mean * target.diagonal()) {
+  const double farthest =
+      std::max(farthest_mean * target.diagonal(),
+               farthest_of_shells * std::sqrt(area(flat_facets(shell)) / real(shell.triangles.size())));
+  if (const double mean = mean_distance(shell, target).first; mean > farthest) {
     throw InputError(
         fmt::format("{}: lies {:.3g} mm from the shells in the mean, {:.2g} % of its diagonal: it is not the "
                     "surface that they were fitted to",
@@ -258,11 +263,17 @@ bool require_own_target(const ShellMesh& shell, const Target& target, const fs::
 std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& mesh, const fs::path& path, bool needed,
                                     LoadedRun& loaded, const Context& context) {
   MeshFile file = read_mesh(path, shell.unit_mm, true);
-  if (const auto note = unit_note(file, path)) {
+  if (const auto note = unit_note(file, path, shell.unit_mm)) {
     context.warn(*note);
   }
   require_surface(file, path);
   const MeshFile own = read_mesh(shell.mesh, shell.unit_mm);
+  if (is_middle_of_wall(own)) {
+    throw InputError(
+        fmt::format("{}: lies half a wall away from {}, which relax moved to the middle of the wall: leave the target "
+                    "out; how far answers may be off by the mesh is then found on the shells' own surface",
+                    path.string(), shell.mesh.string()));
+  }
   require_same_scale(own, shell.mesh, file, path, shell.unit_mm);
   require_near(own, shell.mesh, file, path);
   (void)common_space(own, shell.mesh, file, path);
@@ -294,6 +305,9 @@ void read_targets(const SimulateSettings& settings, LoadedRun& loaded, const Con
     paths = scene.accuracy->targets;
   } else if (settings.target && !scene.shells.empty()) {
     paths = {{scene.shells.front().name, *settings.target}};
+  }
+  if (paths.empty() && scene.shells.size() == 1) {
+    loaded.on_own_patches = is_middle_of_wall(read_mesh(scene.shells.front().mesh, scene.shells.front().unit_mm));
   }
   for (const auto& [name, path] : paths) {
     const auto found = std::ranges::find(scene.shells, name, &SceneShell::name);
@@ -463,8 +477,9 @@ ShellCertificate certify(const ShellMesh& shell, const Target* target, const Pro
 
 /// Whether one refinement can be solved besides.
 bool may_refine(const SimulateSettings& settings, const LoadedRun& loaded) {
-  return is_kind<StaticRun>(settings.scene.run) && !loaded.targets.empty() && loaded.targets.front() &&
-         !settings.unloaded && holds_for_finer_meshes(settings.scene);
+  return is_kind<StaticRun>(settings.scene.run) && !loaded.targets.empty() &&
+         (loaded.targets.front() || loaded.on_own_patches) && !settings.unloaded &&
+         holds_for_finer_meshes(settings.scene);
 }
 
 /// Says how far the answers may be off: by the levels of an accuracy, or by one refinement solved besides.
@@ -547,8 +562,9 @@ std::string answer_text(const LastState& last, bool with_wall) {
   }
   if (with_wall) {
     text += rests ? "" : fmt::format(" (99 % of the wall below {:.4g} mm)", last.displacement_p99);
-    text += fmt::format(", membrane stress of the wall {} (99th percentile), at its faces {}",
-                        pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99));
+    text += fmt::format(", membrane stress of the wall {} (99th percentile), at its faces {}{}",
+                        pressure_text(last.wall.membrane_p99), pressure_text(last.wall.stress_p99),
+                        last.peak ? ", both at the end, too: other states may bear more" : "");
   }
   return text;
 }
@@ -577,6 +593,7 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
     context.warn(*recorded.crossing());
   }
   // Sentences that name their places themselves.
+  std::ranges::for_each(doubts_of_solids(model, last.solid_error), context.warn);
   std::ranges::for_each(swings_of(model, recorded.ended), context.warn);
   std::ranges::for_each(doubts_of_suction(model, settings.scene.run), context.warn);
 }
@@ -637,7 +654,7 @@ LoadedRun load_run(const SimulateSettings& settings, const Context& context) {
   std::ranges::for_each(read.notes, context.note);
   std::ranges::for_each(read.warnings, context.warn);
   for (std::size_t b = 0; scene.accuracy && b < loaded.targets.size(); ++b) {
-    if (!loaded.targets[b] && loaded.model.shells[b].curved) {
+    if (!loaded.targets[b] && loaded.model.shells[b].curved && !loaded.on_own_patches) {
       context.warn({Weight::minor, "no target",
                     fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry "
                                 "is not seen (--target, or target in [accuracy])",

@@ -54,6 +54,7 @@ struct LoadedRun {
   std::vector<std::filesystem::path> inputs;  ///< all that have been read, those of the settings first
   Model model;
   std::vector<std::unique_ptr<Target>> targets;  ///< what each body's shells were fitted to, or none
+  bool on_own_patches = false;                   ///< the mesh is judged by splits on the shells' own patches
   std::optional<double> voxel;                   ///< mm, longest edge, of the image behind them
   std::optional<std::string> space;              ///< world axes, where a mesh says them
 };

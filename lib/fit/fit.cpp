@@ -29,6 +29,8 @@ constexpr int passes = 3;            // of collapses, of mending, steps of settl
 constexpr int default_rounds = 12;   // of exchanges
 constexpr double fewer_by = 0.92;    // of the shells: the next count to be tried
 constexpr int certificates = 16;     // each followed by splits
+constexpr int attempts = 5;          // at a tolerance, from ever finer triangles:
+constexpr double tighter = 0.5;      // of what the attempt before had to keep
 constexpr int patience = 3;          // rounds in a row that bring nothing
 constexpr std::size_t fewest_sampled = 8;  // shells: as few want no fewer points of the target
 constexpr double exchange_share = 0.05;    // of the shells, in a round; half as many where that brought nothing
@@ -78,6 +80,9 @@ public:
     }
     return distance;
   }
+
+  /// Of the best.
+  [[nodiscard]] bool holds_without_crossings() const { return rank_[0] == 1 && rank_[1] == 1; }
 
   std::vector<std::array<Index, 2>> crossings;  // of the shells that were certified last: pairs
   std::vector<Index> thin;                      // likewise: below the smallest angle
@@ -195,28 +200,34 @@ private:
   ShellDistance certified(const ShellMesh& shell) { return best_.certified(shell, result_); }
 
   void to_tolerance(double tolerance) {
-    limits_.error = margin * tolerance;
     const bool keep_coarse = options_.refine || !like_target_;
-    const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, tolerance);
-    FitSamples samples = samples_for(real(start.triangles.size()) / (keep_coarse ? 1 : 3));
-    FitMesh mesh = started(start, samples);
-    settle(mesh, samples, Lessened::mean);
-    improve(mesh, samples, most_);
-    if (options_.refine) {
+    double within = tolerance;  // what coarse triangles have lost of a spike or fold no split brings back
+    for (int attempt = 0; attempt < attempts && !best_.holds_without_crossings(); ++attempt, within *= tighter) {
+      limits_.error = margin * within;
+      const TriangleMesh start = keep_coarse ? coarse_ : decimation_within(target_, within);
+      FitSamples samples = samples_for(real(start.triangles.size()) / (keep_coarse ? 1 : 3));
+      FitMesh mesh = started(start, samples);
       settle(mesh, samples, Lessened::mean);
+      improve(mesh, samples, most_);
+      if (options_.refine) {
+        settle(mesh, samples, Lessened::mean);
+        make_certain(mesh, samples, tolerance);
+        return;
+      }
+      const std::size_t allowed = most_;
+      most_ = max_index;  // the fewest may be few enough, though more are on the way
+      fewer(mesh, samples);
+      most_ = allowed;
+      if (mesh.alive > allowed) {
+        closest(mesh, samples, allowed, 0);
+        certified(mesh.shell());
+        result_.stopped = "the limit of shells was reached";
+        return;
+      }
       make_certain(mesh, samples, tolerance);
-      return;
     }
-    const std::size_t allowed = most_;
-    most_ = max_index;  // the fewest may be few enough, though more are on the way
-    fewer(mesh, samples);
-    most_ = allowed;
-    if (mesh.alive <= allowed) {
-      make_certain(mesh, samples, tolerance);
-    } else {
-      closest(mesh, samples, allowed, 0);
-      certified(mesh.shell());
-      result_.stopped = "the limit of shells was reached";
+    if (result_.reached.value_or(false)) {  // by an attempt before the last
+      result_.stopped = "the tolerance holds";
     }
   }
 

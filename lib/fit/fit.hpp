@@ -16,7 +16,8 @@ struct FitOptions : RelaxOptions {
 /// split where that is needed. With `refine` alone every shell is split in four and refitted (see refit()) as far as
 /// `max_shells` or `max_iterations` allow. Else the closest surface found with `shells` (none: as many as COARSE has).
 /// One search serves all: least squares on a node, a ring or all nodes; edges collapse in the order of the error that
-/// this leaves, flip and split; a certificate, and splits where it finds more.
+/// this leaves, flip and split; a certificate, and splits where it finds more. Where these are in vain, the search for
+/// a tolerance begins again from triangles that keep half of it.
 /// @param coarse  an oriented manifold that faces as the target does; where its topology is not the target's, it is
 /// what is fitted; else its triangles count with `refine` only, else only how many they are
 /// Keeps: topology, boundary loops, creases of the target (curves, with a normal for each side; all other nodes have

@@ -129,7 +129,8 @@ std::optional<double> memory(const PipelineCase& one) {
 
 std::vector<Measure> make_geometry() {
   return {{"volume_ml", "Volume", "ml",
-           "Volume that the extracted surface encloses; where it is open, that of the label's voxels.",
+           "Volume that the extracted surface encloses; where it is open, that of the label's voxels, of a cut organ "
+           "of those that are left.",
            "extract: result.volume_mm3 / 1000, or else result.voxel_volume_mm3 / 1000", true, volume},
           {"area_cm2", "Area", "cm²", "Area of the extracted surface.", "extract: result.area_mm2 / 100", true,
            reported("extract", "result.area_mm2", 1e-2)},

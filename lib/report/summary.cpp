@@ -110,7 +110,7 @@ std::string meanings(const std::vector<PipelineCase>& cases) {
     text +=
         "membrane: von Mises stress, mean over the wall, faces: at either face, strain: largest principal, all the "
         "99th "
-        "percentile by area; displ.: the largest, since the image\n";
+        "percentile by area; displ.: the largest, since the image; of a motion all are those at its end\n";
   }
   if (any("membrane_error_percent") || any("stress_error_percent") || any("displacement_error_percent")) {
     text += "+-: estimated error of the number before it, by number of shells and model\n";

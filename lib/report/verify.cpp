@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <set>
 
@@ -19,20 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 using Strings = std::vector<std::string>;
 
-// What a stage of Makefile.pipeline leaves, the product first that the next stages read, and which products it reads.
-struct Stage {
-  Strings files;
-  Strings reads;
-};
-
-const std::map<std::string, Stage>& stages() {
-  static const std::map<std::string, Stage> all{
-      {"extract", {{"surface.ply"}, {}}},
-      {"decimate", {{"coarse.ply"}, {"extract"}}},
-      {"relax", {{"shell.ply", "map.png"}, {"extract", "decimate"}}},
-      {"simulate", {{"result.hdf", "result.page", "picture.png", "refined.ply"}, {"relax"}}},
-  };
-  return all;
+const PipelineStage& stage_named(std::string_view name) {
+  return *std::ranges::find(pipeline_chain, name, &PipelineStage::name);
 }
 
 // SHA-256 of a file; empty where it is missing or cannot be read.
@@ -114,7 +101,7 @@ void compare_folder(const PipelineCase& one, const std::string& stage, const Cas
 // runs.
 std::string another_run(const PipelineCase& one, const std::string& stage, const std::string& before) {
   return fmt::format("{}: {} read another {} than {} wrote: the files are of two runs, run the case again",
-                     report_file(one, stage), stage, stages().at(before).files.front(), before);
+                     report_file(one, stage), stage, *stage_named(before).files.begin(), before);
 }
 
 void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& found) {
@@ -123,7 +110,7 @@ void compare_inputs(const PipelineCase& one, const std::string& stage, Strings& 
   if (std::ranges::none_of(inputs, hashed)) {
     return;  // none were read, or the report tells no hashes
   }
-  for (const std::string& before : stages().at(stage).reads) {
+  for (const char* before : stage_named(stage).reads) {
     const auto outputs = one.files(before, "outputs");
     if (!outputs.empty() && hashed(outputs.front()) &&
         std::ranges::find(inputs, outputs.front().sha256, &ReportedFile::sha256) == inputs.end()) {
@@ -156,7 +143,7 @@ void find_unclaimed(const PipelineCase& one, const std::string& stage, Strings& 
     return;
   }
   const auto outputs = one.files(stage, "outputs");
-  for (const std::string& name : stages().at(stage).files) {
+  for (const char* name : stage_named(stage).files) {
     const fs::path path = one.folder / name;
     const auto tells = [&](const ReportedFile& file) {
       return file.sha256.empty() || file.path.filename() == name ||
@@ -174,7 +161,8 @@ bool is_no_product(const fs::path& file) {
   const std::string name = file.filename().string();
   const std::string stem = file.stem().string();
   return name.starts_with('.') || name.find(".part") != std::string::npos || file.extension() == ".log" ||
-         file.extension() == ".html" || (file.extension() == ".json" && stages().contains(stem));
+         file.extension() == ".html" ||
+         (file.extension() == ".json" && std::ranges::find(pipeline_stages, stem) != pipeline_stages.end());
 }
 
 // Files of other names that no report tells of, be it as an output or as an input.
@@ -184,8 +172,8 @@ void find_strangers(const PipelineCase& one, Strings& found) {
   }
   std::set<fs::path> known;
   std::set<std::string> contents;  // where names are left out
-  for (const auto& [stage, leaves] : stages()) {
-    known.insert(leaves.files.begin(), leaves.files.end());
+  for (const auto& [stage, files, reads] : pipeline_chain) {
+    known.insert(files.begin(), files.end());
     for (const char* side : {"outputs", "inputs"}) {
       for (const ReportedFile& file : one.files(stage, side)) {
         known.insert(file.path.filename());

@@ -71,7 +71,8 @@ double size_of_unit(const std::string& unit, const std::string& name) {
   try {
     return parse_length_unit(unit);
   } catch (const UsageError&) {
-    throw InputError(fmt::format("{}: its comment \"units {}\" is not understood: um, mm, cm and m are", name, unit));
+    throw InputError(
+        fmt::format("{}: says that its unit is {}, which is not understood: um, mm, cm and m are", name, unit));
   }
 }
 
@@ -128,7 +129,7 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
   } else if (unit_mm) {
     scale(file, *unit_mm);
   } else if (require_unit && format != Format::ply && format != Format::glb) {
-    throw UsageError(fmt::format("{}: its format carries no unit of length, pass --mesh-unit mm|cm|m|um", name));
+    throw UsageError(fmt::format("{}: says no unit of length, pass --mesh-unit mm|cm|m|um", name));
   } else {
     file.unit_unknown = format != Format::ply && format != Format::glb;
     file.unit_assumed = format == Format::ply;
@@ -144,7 +145,14 @@ void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, 
   }
 }
 
-std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path) {
+std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path,
+                                 std::optional<double> unit_mm) {
+  if (unit_mm && file.units && size_of_unit(*file.units, path.string()) != *unit_mm) {
+    return Warning{Weight::note, "unit of length",
+                   fmt::format("{}: says that its unit is {}, and is taken in that: the unit stated (--mesh-unit, or "
+                               "unit in a scene) is for files that say none",
+                               path.string(), *file.units)};
+  }
   if (!file.unit_assumed) {
     return std::nullopt;
   }

@@ -17,8 +17,8 @@ struct MeshFile {
   std::vector<Vec3> normals;                        ///< empty, or #V unit vectors (PLY nx ny nz)
   std::vector<std::array<Vec3, 3>> corner_normals;  ///< empty, or #F
   std::optional<Patch> patch;                       ///< `surface=` comment
-  std::optional<std::string> units;                 ///< what holds by the file: "mm", …; none for OBJ, STL, OFF
-  bool unit_unknown = false;                        ///< no unit in the file's format, and none was given
+  std::optional<std::string> units;                 ///< what holds by the file: "mm", …
+  bool unit_unknown = false;                        ///< an OBJ, STL or OFF that says none, and none was given
   bool unit_assumed = false;                        ///< a PLY that says none: its numbers are taken for mm
   std::optional<double> voxel;                      ///< mm, longest edge: `voxel` comment, of the image behind it
   std::optional<double> shortest_voxel;             ///< mm, its shortest edge
@@ -31,10 +31,9 @@ struct MeshFile {
 /// extension. Polygons are split: a convex one into a fan, another ear by ear. PLY, OBJ and OFF keep their vertices as
 /// they are, also those no face uses; what comes as single triangles (STL, GLB, or a file whose faces share no vertex)
 /// is joined where coordinates are equal, without tolerance. Degenerate triangles are kept: lib/surface finds them.
-/// @param unit_mm  size in mm of the file's unit where it says none. A `units` comment of a PLY wins; a GLB is in
-/// metres
-///   unless this says otherwise; without either, coordinates are mm
-/// @param require_unit  without unit_mm, OBJ, STL and OFF are a UsageError that tells to pass --mesh-unit
+/// @param unit_mm  size in mm of the file's unit where it says none. A unit in a comment or header wins (PLY, OBJ, STL,
+/// OFF: take_frame()); a GLB is in metres unless this says otherwise; without either, coordinates are mm
+/// @param require_unit  without unit_mm, OBJ, STL and OFF that say none are a UsageError that tells to pass --mesh-unit
 /// Errors: InputError naming the file: missing, truncated, bad index, not finite, no triangles, over the limits.
 /// Cost: linear; 1 million triangles: 0.1 s (binary PLY).
 /// Limits: 2^31 - 1 vertices and triangles, coordinates within 1e12 mm.
@@ -43,8 +42,9 @@ MeshFile read_mesh(const std::filesystem::path& path, std::optional<double> unit
 /// For a unit that is meant for this file alone. Errors: InputError when the file's own `units` say another one.
 void require_no_other_unit(const MeshFile& file, std::optional<double> unit_mm, const std::filesystem::path& path);
 
-/// A note where a unit is assumed.
-std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path);
+/// A note where a unit is assumed, or the file's own holds in place of the one that read_mesh() was given.
+std::optional<Warning> unit_note(const MeshFile& file, const std::filesystem::path& path,
+                                 std::optional<double> unit_mm);
 
 /// The curved shell mesh in a file: positions, unit normals, patch. Errors: InputError when it has no normals.
 ShellMesh shell_of(const MeshFile& file, const std::filesystem::path& path);

@@ -23,7 +23,7 @@ public:
         read_face();
       } else if (!keyword.empty() && !keyword.starts_with('v')) {  // comments, and names that may end in one
         const std::string_view rest = scanner_.rest();
-        take_space(file_, {keyword.data(), narrow<std::size_t>(rest.data() + rest.size() - keyword.data())}, name_);
+        take_frame(file_, {keyword.data(), narrow<std::size_t>(rest.data() + rest.size() - keyword.data())}, name_);
       }
       if (++lines_ % 65536 == 0) {
         check_interrupt();

@@ -57,7 +57,7 @@ private:
       if (scanner_.rest().front() != '#') {
         return true;
       }
-      take_space(file_, scanner_.rest(), name_);
+      take_frame(file_, scanner_.rest(), name_);
     }
     return false;
   }
@@ -87,6 +87,9 @@ private:
     }
     if (scanner_.rest().starts_with("BINARY")) {
       fail("binary OFF is not understood: save it as ASCII, or as PLY");
+    }
+    if (!scanner_.at_line_end() && scanner_.rest().front() == '#') {
+      take_frame(file_, scanner_.rest(), name_);
     }
     if ((scanner_.at_line_end() || scanner_.rest().front() == '#') && !next_content()) {
       throw InputError(fmt::format("{}: is truncated: it ends within the header", name_));

@@ -400,7 +400,7 @@ void require_bytes(std::string_view bytes, const Header& header, const std::stri
 
 void understand_comments(MeshFile& file, const std::string& name) {
   for (const std::string& comment : file.comments) {
-    take_space(file, comment, name);
+    take_frame(file, comment, name);
     TextScanner words(comment);
     if (!words.next_line()) {
       continue;
@@ -425,12 +425,8 @@ void understand_comments(MeshFile& file, const std::string& name) {
       }
     } else if (first == "units") {
       const std::string_view unit = words.token();
-      if (words.at_line_end() && !unit.empty()) {
-        if (file.units && *file.units != unit) {
-          throw InputError(fmt::format("{}: its comments \"units {}\" and \"units {}\" contradict each other: keep one",
-                                       name, *file.units, unit.substr(0, 20)));
-        }
-        file.units = unit;
+      if (words.at_line_end() && !unit.empty() && !file.units) {
+        file.units = unit.substr(0, 20);  // no unit of length, which read_mesh() says
       }
     }
   }

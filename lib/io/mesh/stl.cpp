@@ -40,7 +40,7 @@ MeshFile read_binary(std::string_view bytes, const std::string& name) {
     throw InputError(fmt::format("{}: has {} triangles, at most {} are understood", name, count, max_index / 3));
   }
   MeshFile file;
-  take_space(file, bytes.substr(0, 80), name);
+  take_frame(file, bytes.substr(0, 80), name);
   file.mesh.vertices.reserve(3 * count);
   file.mesh.triangles.reserve(count);
   for (std::size_t t = 0; t < count; ++t) {
@@ -79,10 +79,10 @@ public:
         if (keyword != "solid") {
           fail("\"solid\" is expected");
         }
-        take_space(file, scanner_.rest(), name_);
+        take_frame(file, scanner_.rest(), name_);
         inside = true;
       } else if (keyword == "endsolid") {
-        take_space(file, scanner_.rest(), name_);
+        take_frame(file, scanner_.rest(), name_);
         inside = false;
       } else if (keyword == "facet") {
         read_facet(file.mesh);

@@ -205,7 +205,7 @@ void write_surface(const std::filesystem::path& path, const TriangleMesh& mesh, 
     bytes = fmt::format("# {}\n# units mm\n", provenance) + bytes;
   } else if (ending == ".stl") {
     constexpr std::size_t header = 80;
-    std::string head = provenance.substr(0, header);
+    std::string head = "units=mm; " + provenance;
     head.resize(header, ' ');
     bytes.replace(0, header, head);
   }

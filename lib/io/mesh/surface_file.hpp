@@ -22,8 +22,8 @@ struct SurfaceLook {
 
 /// Writes a surface in the format of the path's ending. PLY: write_ply(). GLB, OBJ, binary STL and 3MF: assimp's
 /// exporters. Errors: OutputError.
-/// Limits: those hold floats: 7 digits of a coordinate, OBJ and 3MF 6. STL shares no vertices, and neither it nor OBJ
-/// says a unit (the numbers are mm); GLB is in metres, by the scale of its node. None of them holds shells: normals are
+/// Limits: those hold floats: 7 digits of a coordinate, OBJ and 3MF 6. STL shares no vertices; it and OBJ say their
+/// unit, mm, in header and comment; GLB is in metres, by the scale of its node. None of them holds shells: normals are
 /// for shading. Files of assimp depend on its version to the byte.
 void write_surface(const std::filesystem::path& path, const TriangleMesh& mesh, const PlyOptions& options,
                    const SurfaceLook& look = {});

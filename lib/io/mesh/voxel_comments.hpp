@@ -16,4 +16,12 @@ inline std::vector<std::string> voxel_comments(const MeshFile& file) {
   return kept;
 }
 
+/// The comment of shells that were moved from a face of the wall to its middle.
+inline constexpr std::string_view middle_of_wall = "middle of the wall";
+
+/// Whether a file says so.
+inline bool is_middle_of_wall(const MeshFile& file) {
+  return std::ranges::find(file.comments, middle_of_wall) != file.comments.end();
+}
+
 }  // namespace tunica

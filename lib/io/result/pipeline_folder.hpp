@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,8 +12,23 @@
 /// What Makefile.pipeline leaves in its folder: cases, their stages and the stages' reports.
 namespace tunica {
 
-/// The stages of a case, in order. A stage's report is STAGE.json in the case's folder.
-inline constexpr std::array<const char*, 4> pipeline_stages{"extract", "decimate", "relax", "simulate"};
+/// What a stage of Makefile.pipeline leaves in the case's folder beside its report, STAGE.json.
+struct PipelineStage {
+  const char* name;
+  std::initializer_list<const char*> files;  ///< first the product that later stages read
+  std::initializer_list<const char*> reads;  ///< stages
+};
+
+/// The stages of a case, in order; tools/pipeline.py and the rules of the Makefile have the same.
+inline constexpr std::array<PipelineStage, 4> pipeline_chain{
+    {{"extract", {"surface.ply"}, {}},
+     {"decimate", {"coarse.ply"}, {"extract"}},
+     {"relax", {"shell.ply", "map.png"}, {"extract", "decimate"}},
+     {"simulate", {"result.hdf", "result.page", "picture.png", "refined.ply"}, {"relax"}}}};
+
+/// Their names.
+inline constexpr std::array<const char*, 4> pipeline_stages{pipeline_chain[0].name, pipeline_chain[1].name,
+                                                            pipeline_chain[2].name, pipeline_chain[3].name};
 
 /// A file that a report names.
 struct ReportedFile {

@@ -53,8 +53,8 @@ auto read_at(const Places& places, std::string_view key, const std::filesystem::
   try {
     return read();
   } catch (const UsageError&) {
-    throw InputError(fmt::format("{}: {} is in a format that carries no unit of length: add unit = \"mm\" beside {}",
-                                 places.of(key).text, mesh.string(), key));
+    throw InputError(fmt::format("{}: {} says no unit of length: add unit = \"mm\" beside {}", places.of(key).text,
+                                 mesh.string(), key));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", places.of(key).text, error.what()));
   } catch (const RequirementError& error) {
@@ -83,7 +83,7 @@ BodyMesh read_body_mesh(const SceneShell& shell, BodyFindings& found) {
     const MeshFile& file = mesh.file;
     join_space(file, shell.mesh, found);
     require_no_other_unit(file, shell.unit_mm, shell.mesh);
-    if (const auto note = unit_note(file, shell.mesh)) {
+    if (const auto note = unit_note(file, shell.mesh, shell.unit_mm)) {
       found.warnings.push_back(*note);
     }
     mesh.curved = shell.rest == Rest::curved && !(file.normals.empty() && file.corner_normals.empty());
@@ -122,7 +122,7 @@ TriangleMesh read_closed_surface(const std::filesystem::path& path, std::optiona
   MeshFile file = read_mesh(path, unit_mm, true);
   join_space(file, path, found);
   require_no_other_unit(file, unit_mm, path);
-  if (const auto note = unit_note(file, path)) {
+  if (const auto note = unit_note(file, path, unit_mm)) {
     found.warnings.push_back(*note);
   }
   const MeshFacts facts = require_surface(file, path);
@@ -146,7 +146,20 @@ TetMesh fill_surface(const SceneSolid& solid, BodyFindings& found) {
       expected <= most_tetrahedra,
       fmt::format("would make about {:.2g} tetrahedra (at most {:.0e}): choose a larger size", expected,
                   most_tetrahedra));
-  return read_at(solid.places, "fill", solid.mesh, [&] { return fill(surface, size); });
+  TetMesh mesh = read_at(solid.places, "fill", solid.mesh, [&] { return fill(surface, size); });
+  double filled = 0;
+  for (const auto& [a, b, c, d] : mesh.tetrahedra) {
+    filled += tet_volume(mesh.vertices[a], mesh.vertices[b], mesh.vertices[c], mesh.vertices[d]);
+  }
+  constexpr double notable = 0.02;
+  if (const double whole = std::abs(signed_volume(surface)); std::abs(filled / whole - 1) > notable) {
+    found.warnings.push_back(
+        {Weight::minor, "volume of a filling",
+         fmt::format("{}: its tetrahedra fill {:.4g} of the {:.4g} mm3 that the surface encloses, {:.1f} %: mass and "
+                     "stiffness are as much too small: take a smaller size",
+                     solid.mesh.string(), filled, whole, 100 * filled / whole)});
+  }
+  return mesh;
 }
 
 RigidMesh load_shape(const SceneRigidMesh& mesh, const SceneRigid& rigid, BodyFindings& found) {

@@ -227,7 +227,7 @@ SceneKeys<Scene> run_keys() {
 template <typename Body>
 void append_size(SceneKeys<Body>& keys) {
   keys.push_back(key("unit", &Body::unit_mm, form::unit_of_length(),
-                     "unit of length of a mesh in a format that carries none (OBJ, STL, OFF, tetrahedra)"));
+                     "unit of length of a mesh that says none (OBJ, STL, OFF, tetrahedra)"));
   keys.push_back(key("scale", &Body::scale, number.in(positive), "factor of the mesh's coordinates"));
 }
 
@@ -390,7 +390,9 @@ SceneKeys<SceneFix> fix_keys() {
   SceneKeys<Fix> of_axes{
       key("translation", &Fix::translation, form::axes(), "held components in world axes, \"\" for none")
           .needed(axes_are_said),
-      key("rotation", &Fix::rotation, form::axes(), "likewise; not of a solid's nodes").without_default(),
+      key("rotation", &Fix::rotation, form::axes(),
+          "likewise, of a shell's nodes, where it is needed; ends that are pulled hold it about the wall's normal, too")
+          .without_default(),
       key("displacement", &Fix::displacement, form::vector(dimension::length, "m", R"(["0mm", "0mm", "1mm"])"),
           "prescribed instead of held")
           .deciding(),

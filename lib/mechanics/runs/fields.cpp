@@ -33,6 +33,46 @@ std::vector<double> lengths(const std::vector<Vec3>& vectors) {
   return result;
 }
 
+/// Of ElementFields::solid_error. @param stresses  MPa, of all tetrahedra
+std::vector<double> solid_errors(const ShellSystem& system, const std::vector<Mat3>& stresses) {
+  const Model& model = *system.model;
+  std::vector<Mat3> at_nodes(model.node_count(), Mat3::Zero());
+  std::vector<double> volumes(model.node_count(), 0);
+  for (std::size_t e = 0; e < stresses.size(); ++e) {
+    for (const Index node : system.solids[e].nodes) {
+      at_nodes[node] += system.solids[e].volume * stresses[e];
+      volumes[node] += system.solids[e].volume;
+    }
+  }
+  std::vector<std::array<double, 2>> energies(model.solids.size(), {0, 0});  // of the stress, of the differences
+  for (std::size_t e = 0; e < stresses.size(); ++e) {
+    const SolidElement& element = system.solids[e];
+    const double bulk = element.bulk_of_displacement + element.bulk_of_pressure;
+    const auto energy = [&](const Mat3& one, const Mat3& other) {
+      const double volumetric = one.trace() * other.trace() / 9;
+      return element.volume *
+             ((one.cwiseProduct(other).sum() - 3 * volumetric) / (4 * element.shear) + volumetric / (2 * bulk));
+    };
+    std::array<Mat3, 4> off;
+    Mat3 sum = Mat3::Zero();
+    for (std::size_t k = 0; k < 4; ++k) {
+      off[k] = at_nodes[element.nodes[k]] / volumes[element.nodes[k]] - stresses[e];
+      sum += off[k];
+    }
+    auto& [whole, jumps] = energies[element.body - model.shells.size()];
+    whole += energy(stresses[e], stresses[e]);
+    jumps += energy(sum, sum) / 20;  // the mass matrix of linear functions has 1 / 10 and 1 / 20
+    for (const Mat3& at_corner : off) {
+      jumps += energy(at_corner, at_corner) / 20;
+    }
+  }
+  std::vector<double> errors;
+  for (const auto& [whole, jumps] : energies) {
+    errors.push_back(whole + jumps > 0 ? jumps / (whole + jumps) : 0);
+  }
+  return errors;
+}
+
 const Model& checked(const Model& model) {
   require_valid(model);
   return model;
@@ -307,6 +347,7 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
 }
 
 void ElementFieldEvaluator::Implementation::add_solids(const State& state, ElementFields& fields) const {
+  std::vector<Mat3> stresses;
   std::vector<double> sums(model.node_count(), 0);
   std::vector<double> volumes(model.node_count(), 0);
   std::vector<Facet> strains;
@@ -322,6 +363,7 @@ void ElementFieldEvaluator::Implementation::add_solids(const State& state, Eleme
       strains.push_back({element.volume, {strain, strain, strain}});
     }
     const Mat3 stress = solid_stress(element, motion, state.linear);
+    stresses.push_back(stress);
     const double mean = stress.trace() / 3;
     fields.solid_von_mises.push_back(std::sqrt(1.5) * (stress - mean * Mat3::Identity()).norm());
     fields.solid_pressure.push_back(-mean);
@@ -337,6 +379,7 @@ void ElementFieldEvaluator::Implementation::add_solids(const State& state, Eleme
       fields.von_mises[i] = fields.membrane_stress[i] = sums[i] / volumes[i];
     }
   }
+  fields.solid_error = solid_errors(system, stresses);
 }
 
 ElementFields ElementFieldEvaluator::operator()(const State& state) const {

@@ -65,6 +65,11 @@ struct ElementFields {
   std::vector<double> solid_von_mises;  ///< MPa, #tetrahedra of all solids in order; of the true (Cauchy) stress
   double solid_strain_p99 = 0;          ///< Green's, what 1 % of the volume of solids of law corotational exceeds
   std::vector<double> solid_pressure;   ///< MPa, the same; minus the mean stress: positive in compression
+  /// #solids: the energy of the jumps of stress between tetrahedra, over it and the energy of the stress: by that part
+  /// a body is too stiff, and by up to twice of it where a few tetrahedra lie across what bends. Of the difference to
+  /// the stress averaged at the nodes: Zienkiewicz, Zhu 1987, "A simple error estimator and adaptive procedure for
+  /// practical engineering analysis".
+  std::vector<double> solid_error;
 };
 
 /// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the

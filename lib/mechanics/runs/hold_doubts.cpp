@@ -7,6 +7,7 @@
 #include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/meeting_walls.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
@@ -50,6 +51,19 @@ bool is_pressed(const std::vector<double>& pressures) {
   return std::ranges::any_of(pressures, [](double pressure) { return pressure != 0; });
 }
 
+/// Nodes of the shells on which the nodes of another body lie.
+std::vector<Index> carriers(const Model& model, const Attachment& attachment) {
+  const TriangleMesh mesh = flat_facets(model.shells[attachment.to].mesh);
+  const ClosestPoint closest(mesh);
+  const std::vector<Vec3>& places = model.vertices_of(attachment.body);
+  std::vector<Index> nodes;
+  for (const Index node : attachment.nodes) {
+    const auto& corners = mesh.triangles[closest.closest(places[node]).triangle];
+    nodes.insert(nodes.end(), corners.begin(), corners.end());
+  }
+  return nodes;
+}
+
 /// Per node of a body: whether a fix, a load at nodes or edges, or another body takes hold of it.
 std::vector<char> touched_nodes(const Model& model, std::size_t body) {
   std::vector<char> touched(model.vertices_of(body).size(), 0);
@@ -66,6 +80,8 @@ std::vector<char> touched_nodes(const Model& model, std::size_t body) {
   for (const Attachment& attachment : model.attachments) {
     if (attachment.body == body) {
       mark(attachment.nodes);
+    } else if (attachment.to == body) {
+      mark(carriers(model, attachment));
     }
   }
   for (const Load& load : model.loads) {

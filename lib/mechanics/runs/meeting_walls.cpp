@@ -281,7 +281,11 @@ void CrossingWatch::see(const State& state) {
                           "between what meets, the same body twice where it is itself, or lower the load",
                           named(model_.shells.front().said_at, model_.shells.front().name), when, what, where(place))};
   };
-  const std::vector<std::array<Index, 2>> crossings = crossings_of(now);
+  // What is tied meets in a seam, where the chords of the one go through the other.
+  const auto tied = [&](Index a, Index b) { return body_[a] != body_[b] && are_tied(model_, body_[a], body_[b]); };
+  std::vector<std::array<Index, 2>> crossings = crossings_of(now);
+  std::erase_if(crossings,
+                [&](const auto& pair) { return tied(now.triangles[pair[0]][0], now.triangles[pair[1]][0]); });
   if (!crossings.empty()) {
     if (!before_) {
       before_ = crossings_of(joined_shells(model_, nullptr));
@@ -297,7 +301,6 @@ void CrossingWatch::see(const State& state) {
       return;
     }
   }
-  const auto tied = [&](Index a, Index b) { return body_[a] != body_[b] && are_tied(model_, body_[a], body_[b]); };
   Meetings met = meetings(now.triangles, half_wall_, last, now.vertices, tied);
   if (!met.passed.empty()) {
     tell("walls through each other",

@@ -2,12 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace tunica {
 
 std::string named(const std::string& said_at, const std::string& name) {
   return said_at.empty() ? name : said_at + ": " + name;
 }
 
-std::string where(const Vec3& p) { return fmt::format("({:.4g}, {:.4g}, {:.4g}) mm", p.x(), p.y(), p.z()); }
+std::string where(const Vec3& p) {
+  constexpr double round_off = 1e-9;  // of the largest coordinate
+  const double negligible = round_off * p.cwiseAbs().maxCoeff();
+  const Vec3 shown = p.unaryExpr([&](double x) { return std::abs(x) < negligible ? 0 : x; });
+  return fmt::format("({:.4g}, {:.4g}, {:.4g}) mm", shown.x(), shown.y(), shown.z());
+}
 
 }  // namespace tunica

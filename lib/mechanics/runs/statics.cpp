@@ -63,7 +63,7 @@ public:
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, c, factor, forces_, tangent, predicted);
     };
-    const VectorX held = prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor);
+    const VectorX held = still_to_move(factor, configuration);
     begin_contact(system_, settings_, previous_factor, factor, configuration, solver_, matrix_);
     // What was imaged under pressure may be there already.
     const bool likely_at_rest = system_.prestress_residual.has_value();
@@ -108,13 +108,12 @@ public:
 
   /// Where the path has lost its stability: moves what is prescribed, and lets the shell creep to where it can rest.
   /// Errors: MemoryError: with the cg solver, a factor does not fit into the memory.
-  SettleResult let_go(double factor, double previous_factor, Configuration& configuration) {
+  SettleResult let_go(double factor, Configuration& configuration) {
     const auto balance = [&](const Configuration& c, BlockMatrix* tangent, const std::vector<ElementState>& predicted) {
       return static_balance(system_, c, factor, forces_, tangent, predicted);
     };
     begin_contact(system_, settings_, factor, factor, configuration, solver_, matrix_);
-    advance_configuration(
-        system_, prescribed_positions(system_, factor) - prescribed_positions(system_, previous_factor), configuration);
+    advance_configuration(system_, still_to_move(factor, configuration), configuration);
     if (settings_.solver != Solver::cg) {
       return settle(system_, settings_, *solver_, balance, matrix_, configuration);
     }
@@ -131,6 +130,16 @@ public:
   void tell_direct_error(bool tell) { solver_->tell_direct_error(tell); }
 
 private:
+  /// From a configuration to what is prescribed at a load factor, 6 per node. A ramp may begin with another factor than
+  /// zero.
+  [[nodiscard]] VectorX still_to_move(double factor, const Configuration& configuration) const {
+    VectorX moved = prescribed_positions(system_, factor);
+    for (const PrescribedFreedom& p : system_.prescribed) {
+      moved[p.freedom] -= configuration.displacement[p.freedom / 6][narrow<Eigen::Index>(p.freedom % 6)];
+    }
+    return moved;
+  }
+
   /// Of the last tangent. One of what slides is unsymmetric, and says nothing; nor does one whose factor does not fit
   /// into the memory.
   [[nodiscard]] bool is_positive() {
@@ -371,7 +380,7 @@ private:
     NewtonResult told = failed;
     SettleResult settled;
     try {
-      settled = step_.let_go(beyond, factor_, attempt);
+      settled = step_.let_go(beyond, attempt);
     } catch (const MemoryError&) {
       fail(told, {}, "", place_of_yielding(attempt));
     }

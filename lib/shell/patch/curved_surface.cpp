@@ -46,7 +46,6 @@ std::array<Vec3, 3> second_difference(const std::array<Vec3, 10>& p, const Vec3&
 
 const Vec3 along_b2(-1, 1, 0);
 const Vec3 along_b3(-1, 0, 1);
-const Vec3 along_23(0, -1, 1);
 
 double largest_norm(const std::array<Vec3, 3>& v) {
   return std::sqrt(std::max({v[0].squaredNorm(), v[1].squaredNorm(), v[2].squaredNorm()}));
@@ -63,14 +62,7 @@ double largest_product_sum(double a, double b, double c) {
 }
 
 /// flatness() at level 1; level m divides it by m^2.
-double coarsest_flatness(const CubicPatch& patch) {
-  const auto& p = patch.control;
-  // On a piece with edges e: interpolation error = -3 sum_edges l_i l_j S_e, S_e the second difference along the edge
-  // at some points of the piece, each at most its largest over the patch.
-  return 3 * largest_product_sum(largest_norm(second_difference(p, along_b2, along_b2)),
-                                 largest_norm(second_difference(p, along_23, along_23)),
-                                 largest_norm(second_difference(p, along_b3, along_b3)));
-}
+double coarsest_flatness(const CubicPatch& patch) { return flatness(patch, {Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}); }
 
 /// Pieces per edge for which flatness() is at most `deviation`.
 double level_for(const CubicPatch& patch, double deviation) {
@@ -418,6 +410,18 @@ void require_fit(const ShellMesh& shell, const std::string& name) {
                       name, t, at.x(), at.y(), at.z(), agreement, least_normal_agreement));
     }
   }
+}
+
+double flatness(const CubicPatch& patch, const std::array<Vec2, 3>& piece) {
+  // Interpolation error = -3 sum_edges l_i l_j S_e, S_e the second difference along the edge at some points of the
+  // piece, each at most its largest over the patch.
+  std::array<double, 3> differences{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2 along = piece[(k + 1) % 3] - piece[k];
+    const Vec3 edge(-along.sum(), along[0], along[1]);
+    differences[k] = largest_norm(second_difference(patch.control, edge, edge));
+  }
+  return 3 * largest_product_sum(differences[0], differences[1], differences[2]);
 }
 
 double flatness(const CubicPatch& patch, int level) { return coarsest_flatness(patch) / (real(level) * real(level)); }

@@ -137,8 +137,10 @@ double tessellation_size(const ShellMesh& shell, double deviation);
 /// level pieces per edge, 1 to 10,000 (else InputError): level^2 triangles per patch. Its `deviation` is certified too.
 Tessellation tessellate_uniformly(const ShellMesh& shell, int level);
 
-/// Upper bound, mm, of the distance at equal parameters between a patch and its level^2 flat triangles.
+/// Upper bound, mm, of the distance at equal parameters between a patch and its level^2 flat triangles, and between a
+/// piece of it, given by the parameters of its corners, and one flat triangle.
 double flatness(const CubicPatch& patch, int level);
+double flatness(const CubicPatch& patch, const std::array<Vec2, 3>& piece);
 
 /// Volume in mm3 enclosed by the curved surface of a closed shell mesh, positive when its triangles face outward:
 /// exact integrals over the patches, and over the gaps between adjacent ones, closed by the ruled surfaces between

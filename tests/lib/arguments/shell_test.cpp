@@ -10,6 +10,7 @@
 #include "tunica/shell/distance/shell_quality.hpp"
 #include "tunica/shell/patch/curved_surface.hpp"
 #include "tunica/shell/patch/refine.hpp"
+#include "tunica/shell/patch/tessellate_conforming.hpp"
 #include "tunica/wall/face_distance.hpp"
 #include "tunica/wall/mid_surface.hpp"
 
@@ -85,6 +86,11 @@ TEST(ShellArguments, ShellMeshesAreChecked) {
       {
           {"curved_patches", [](const ShellMesh& s) { curved_patches(s); }},
           {"tessellate", [](const ShellMesh& s) { tessellate(s, 0.1); }},
+          {"tessellate_conforming",
+           [](ShellMesh s) {
+             s.patch = Patch::watertight;
+             tessellate_conforming(s, 0.1);
+           }},
           {"tessellation_size", [](const ShellMesh& s) { tessellation_size(s, 0.1); }},
           {"tessellate_uniformly", [](const ShellMesh& s) { tessellate_uniformly(s, 2); }},
           {"curved_volume", [](const ShellMesh& s) { curved_volume(s); }},
@@ -123,6 +129,7 @@ TEST(ShellArguments, NumbersAreChecked) {
       {"limit", [&](double x) { shell_distance(shell, ball(), wide(0.1, x)); }},
       {"flat width", [&](double x) { flat_distance(shell, ball(), wide(x)); }},
       {"deviation", [&](double x) { tessellate(shell, x); }},
+      {"deviation", [&](double x) { tessellate_conforming(shell, x); }},
       {"deviation of errors", [&](double x) { shell_errors(shell, ball(), x); }},
       {"slack", [&](double x) { mean_distance_bound(shell, ball(), x); }},
       {"width of boundaries", [&](double x) { boundary_distance({}, ball(), x); }},

@@ -14,6 +14,7 @@ namespace tunica::hold_doubts {
 namespace {
 
 using namespace benchmarks;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -81,6 +82,37 @@ TEST(HoldDoubts, AnEndWhereNoPressureActsLacksNothing) {
   const std::vector<Warning> found = doubts_of_ends(model);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_THAT(found[0].text, HasSubstr("3.11 N"));
+}
+
+/// Two halves of a vessel, one tied to the rim of the other, whose shells lie half of one farther around.
+TEST(HoldDoubts, AHalfThatCarriesTheOtherIsNoFreeEndAndItsSeamNoCrossing) {
+  Model model = tube(10, 20, 1, 0.01);
+  model.shells.push_back(model.shells[0]);
+  model.shells[1].name = "other";
+  ShellMesh& other = model.shells[1].mesh;
+  const Mat3 turn = Eigen::AngleAxisd(pi / 24, Vec3::UnitZ()).toRotationMatrix();
+  for (std::size_t v = 0; v < other.vertices.size(); ++v) {
+    other.vertices[v] = turn * other.vertices[v] + Vec3(0, 0, 20);
+    other.normals[v] = turn * other.normals[v];
+  }
+  model.loads.push_back({1, PressureLoad{0.01, true}, {}});
+  for (const std::size_t b : {0, 1}) {
+    Fix fix;
+    fix.body = b;
+    fix.nodes = nodes_where(model.shells[b].mesh, [&](const Vec3& p) { return std::abs(p.z() - 40.0 * b) < eps; });
+    fix.translation = fix.rotation = {true, true, true};
+    model.fixes.push_back(fix);
+  }
+  EXPECT_THAT(kinds(doubts_of_ends(model)), ElementsAre("walls through each other", "free end", "free end"));
+  Attachment seam;
+  seam.body = 1;
+  seam.nodes = nodes_where(other, [](const Vec3& p) { return p.z() < 20 + eps; });
+  seam.to = 0;
+  model.attachments.push_back(seam);
+  EXPECT_THAT(doubts_of_ends(model), IsEmpty());
+  CrossingWatch watch(model);
+  solve(model, nonlinear_run({1}), [&](const State& state) { watch.see(state); });
+  EXPECT_FALSE(watch.found().has_value());
 }
 
 TEST(HoldDoubts, ASheetHasNoLumen) {

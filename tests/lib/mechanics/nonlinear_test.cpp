@@ -99,6 +99,31 @@ TEST(Nonlinear, PrescribedDisplacementsAreReachedOrTheRunFails) {
   EXPECT_GE(reached, 6U);
 }
 
+// A ramp of any beginning moves to its factor, not by what it changes.
+TEST(Nonlinear, PrescribedDisplacementsFollowTheirRampFromItsFirstFactor) {
+  const Grid grid = make_grid(2, 4, [](double u, double v) { return Vec3(10 * u, 40 * v, 0); });
+  for (const Ramp& ramp : {Ramp{{{0, 1}, {1, 1}}}, Ramp{{{0, 0.5}, {1, 1}}}, Ramp{{{0, 1}, {1, 0.5}}},
+                           Ramp{{{0, 1}, {1, 0}}}, Ramp{{{0.5, 0.25}}}}) {
+    for (const std::size_t steps : {1, 4}) {
+      Model model;
+      model.shells.push_back(flat_body(grid.mesh, 1, 0.3, 1));
+      hold(
+          model, [](const Vec3& p) { return p.y() < 1e-9; }, "xyz", "xyz");
+      hold(
+          model, [](const Vec3& p) { return p.y() > 40 - 1e-9; }, "xyz", "");
+      model.fixes.back().displacement = Vec3(0, 1, 0);
+      model.fixes.back().ramp = ramp;
+      const Index end = grid.node(0, 4);
+      solve(model, nonlinear_run(equal_steps(steps)), [&](const State& state) {
+        const double factor = state.load_factor > 0 ? ramp.at(state.load_factor) : 0;
+        EXPECT_NEAR(state.displacement[end].y(), factor, 1e-12);
+      });
+      const double linear = last_state(model, linear_run()).displacement[end].y();
+      EXPECT_NEAR(linear, ramp.at(1), 1e-12);
+    }
+  }
+}
+
 TEST(Nonlinear, ClosedSphereUnderPressureIsInBalance) {
   // The supports of a body held by its rigid motions carry nothing, and the shell does not move as a whole.
   const Model model = pressurised_sphere(1, 1, 0.5);

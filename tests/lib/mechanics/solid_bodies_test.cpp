@@ -1,7 +1,9 @@
 // Bodies of tetrahedra against analytic and published solutions.
 
 #include "tets.hpp"
+#include "tunica/core/error.hpp"
 #include "tunica/mechanics/model/selection.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 #include "tunica/mechanics/solids/solid_element.hpp"
 #include "tunica/surface/mesh/tet_checks.hpp"
@@ -14,9 +16,13 @@ namespace {
 
 using namespace benchmarks;
 
-/// Tip deflection of a cantilever of square section, length 6, over Timoshenko's; Poisson's ratio 0.3, n cells through
-/// the thickness.
-double cantilever(std::size_t n, SolidLaw law, bool linear) {
+struct Bent {
+  double deflection = 0;  ///< over Timoshenko's
+  double error = 0;       ///< ElementFields::solid_error
+};
+
+/// Tip deflection of a cantilever of square section, length 6; Poisson's ratio 0.3, n cells through the thickness.
+Bent bent(std::size_t n, SolidLaw law, bool linear) {
   constexpr double length = 6, side = 1, young = 1000, poisson = 0.3, load = 0.01;
   Model model =
       one_solid(make_block(6 * n, n, n, [](const Vec3& u) { return Vec3(u.x() * length, u.y() * side, u.z() * side); }),
@@ -43,8 +49,11 @@ double cantilever(std::size_t n, SolidLaw law, bool linear) {
   }
   const double inertia = side * side * side * side / 12, shear = young / (2 * (1 + poisson));
   const double bending = load * length * length * length / (3 * young * inertia);
-  return mean / (bending + load * length / (shear * side * side * 5 / 6));
+  return {mean / (bending + load * length / (shear * side * side * 5 / 6)),
+          element_fields(model, state).solid_error.at(0)};
 }
+
+double cantilever(std::size_t n, SolidLaw law, bool linear) { return bent(n, law, linear).deflection; }
 
 /// A bar pulled to twice its length, all of it by the same: Green's strain is (4 - 1) / 2, and what its sides contract.
 TEST(SolidBody, SaysHowFarItIsStrainedBeyondItsLaw) {
@@ -72,6 +81,37 @@ TEST(SolidCantilever, ConvergesToBeamTheory) {
   EXPECT_LT(errors[1], errors[0] / 2.5);
   EXPECT_LT(errors[2], errors[1] / 3);
   EXPECT_LT(errors[2], 0.05);
+}
+
+/// What bends by too little says by how much, to a factor of two.
+TEST(SolidCantilever, ItsErrorIsEstimatedByTheJumpsOfStress) {
+  for (const std::size_t n : {2, 4, 8}) {
+    for (const bool linear : {true, false}) {
+      const Bent beam = bent(n, SolidLaw::corotational, linear);
+      EXPECT_GT(1 - beam.deflection, 0.8 * beam.error) << n;
+      EXPECT_LT(1 - beam.deflection, 2.05 * beam.error) << n;
+    }
+  }
+}
+
+/// A stress that is the same everywhere does not jump.
+TEST(SolidBody, AConstantStressHasNoError) {
+  Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1000, 0, SolidLaw::neo_hookean);
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.y() < eps; }, "y");
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.z() < eps; }, "z");
+  move_nodes(
+      model, 0, [](const Vec3& x) { return x.x() > 1 - eps; }, [](const Vec3&) { return Vec3(0.3, 0, 0); });
+  const ElementFields fields = element_fields(model, last_state(model, nonlinear_run({1})));
+  EXPECT_LT(fields.solid_error.at(0), 1e-12);
+  EXPECT_THAT(doubts_of_solids(model, fields.solid_error), ::testing::IsEmpty());
+  const std::vector<Warning> coarse = doubts_of_solids(model, {0.3});
+  ASSERT_EQ(coarse.size(), 1U);
+  EXPECT_THAT(coarse[0].text, ::testing::HasSubstr("30 to 66 % too little"));
+  EXPECT_THROW(doubts_of_solids(model, {}), InputError);
 }
 
 /// Deflections of less than 1 % of the length: all laws say the same.

@@ -1,17 +1,22 @@
-#include "tunica/shell/patch/curved_surface.hpp"
+#include "tunica/shell/patch/tessellate_conforming.hpp"
 
 #include "shell/families.hpp"
 #include "shell/gaps.hpp"
 #include "tunica/core/error.hpp"
+#include "tunica/core/narrow.hpp"
+#include "tunica/shell/distance/curved_hausdorff.hpp"
 #include "tunica/shell/distance/target.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 
 namespace tunica {
@@ -277,6 +282,54 @@ TEST(Watertight, NormalsPerCornerKeepTheRimsOfAClosedCylinder) {
   for (volatile double& number : numbers) {
     number = std::numeric_limits<double>::quiet_NaN();
   }
+}
+
+/// Edges that do not have two triangles of opposite direction.
+std::size_t open_edges(const TriangleMesh& mesh) {
+  std::map<std::array<Index, 2>, int> runs;
+  for (const auto& v : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::array<Index, 2> edge{v[k], v[(k + 1) % 3]};
+      ++runs[edge];
+      --runs[{edge[1], edge[0]}];
+    }
+  }
+  return narrow<std::size_t>(std::ranges::count_if(runs, [](const auto& run) { return run.second != 0; }));
+}
+
+TEST(Watertight, ConformingTrianglesCloseAClosedShellWithinTheDeviation) {
+  for (const double crease : {0.0, 0.3}) {
+    ShellMesh shell = rough_ball(1, crease);
+    for (const double deviation : {0.1, 1e-2, 1e-3, 1e-4}) {
+      const TriangleMesh mesh = tessellate_conforming(shell, deviation);
+      EXPECT_EQ(open_edges(mesh), 0U);
+      ShellDistanceOptions options;
+      options.width = 0.2 * deviation;
+      EXPECT_LT(curved_hausdorff(shell, Target(mesh), options).both.lower, deviation);
+      EXPECT_NEAR(signed_volume(mesh), curved_volume(shell), 10 * deviation);
+      const Tessellation open = tessellate(shell, deviation);
+      EXPECT_GT(open_edges(open.mesh), 0U);
+      if (deviation < 1e-2) {  // else the fewest pieces that have a vertex inside decide
+        EXPECT_LT(real(mesh.triangles.size()), 2 * real(open.mesh.triangles.size()));
+      }
+    }
+    EXPECT_THROW(tessellate_conforming(shell, 1e-4, 10'000), RequirementError);
+    shell.patch = Patch::comas;
+    EXPECT_THROW(tessellate_conforming(shell, 1e-2), InputError);
+  }
+}
+
+TEST(Watertight, ConformingTrianglesOfAnOpenShellEndAtItsBoundary) {
+  ShellMesh shell = watertight(sphere_shell(1));
+  shell.triangles.resize(30);
+  const TriangleMesh mesh = tessellate_conforming(shell, 1e-3);
+  const TriangleMesh flat = flat_facets(shell);
+  std::size_t boundary = 0;
+  for (const auto& loop : boundary_loops(mesh)) {
+    boundary += loop.size();
+  }
+  EXPECT_EQ(boundary, open_edges(mesh) / 2);
+  EXPECT_EQ(boundary_loops(mesh).size(), boundary_loops(flat).size());
 }
 
 TEST(Watertight, VolumeDoesNotDependOnWhatWasInMemory) {

@@ -38,6 +38,7 @@ class Cuts(ToolTest):
             areas = numpy.linalg.norm(numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
             self.assertGreater(areas.min(), 0.002)
             self.assertAlmostEqual(areas.sum() / (2 * numpy.pi * 6 * (high - low)), 1.1, delta=0.15)
+            self.assertAlmostEqual(result["voxel_volume_mm3"] / (numpy.pi * 36 * (high - low)), 1, delta=0.05)
 
     def test_planes_are_of_the_space_asked_for(self):
         for space, kept in (("lps", lambda x: x.max() == -12), ("ras", lambda x: x.max() == 12)):

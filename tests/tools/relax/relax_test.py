@@ -740,6 +740,24 @@ class MidSurface(Case):
             self.relax(self.ball, self.ball, self.out, "--shells", 300, *arguments, code=2, says=says)
 
 
+    def test_the_middle_of_a_wall_has_no_target_and_is_judged_on_its_own(self):
+        """Half a wall away lies another surface, whose answers are others."""
+        middle = self.path("middle.ply")
+        self.relax(self.ball, self.ball, middle, "--shells", 320, "--mid-surface", "inner", "--thickness", "1mm")
+        held = ["--poisson", 0.45, "--thickness", "1mm", "--imaged-at", "10kPa", "--fix", "rigid-motions", "--static", "--force"]
+        self.run_tool("simulate", middle, self.path("out.hdf"), *held, "--target", self.ball, code=3,
+                      says="moved to the middle of the wall")
+        report = self.run_tool("simulate", middle, self.path("out.hdf"), *held)
+        self.assertNotIn("coarse", " ".join(report["warnings"]))
+        estimate = report["result"]["estimates"]["membrane_p99_mpa"]
+        radius = np.linalg.norm(Ply(middle).vertices, axis=1).mean()
+        self.assertLess(abs(report["result"]["wall"]["membrane_p99_mpa"] / (10e-3 * radius / 2) - 1), 0.02)
+        self.assertLess(estimate["percent"], 5)
+        claim = self.run_tool("simulate", middle, self.path("out.hdf"), *held, "--accuracy", "2%", "--of", "membrane")
+        self.assertNotIn("--target", " ".join(claim["warnings"]))
+        self.assertLess(abs(claim["result"]["accuracy"]["value"] / (10e-3 * radius / 2) - 1), 0.02)
+
+
 class Patch(Case):
     def test_the_file_alone_gives_the_curved_surface(self):
         vertices, triangles = sphere(3)
@@ -778,8 +796,36 @@ class Patch(Case):
         self.assertEqual(fine_used, len(fine))
 
 
+class Spikes(Case):
+    def test_a_tolerance_holds_at_a_spike_and_in_a_hole_as_narrow_as_its_triangles(self):
+        vertices, triangles = sphere(5)
+        vertices /= np.linalg.norm(vertices, axis=1)[:, None]
+        near = np.clip(1 - np.linalg.norm(vertices - [0.6, 0.48, 0.64], axis=1) / 0.04, 0, None)[:, None]
+        for depth in (0.3, -0.3):
+            with self.subTest(depth):
+                write_ply(self.path("spiky.ply"), 10 * vertices * (1 + depth * near), triangles)
+                result = self.relax(self.path("spiky.ply"), self.path("spiky.ply"), self.path("shell.ply"), "--tolerance", "1%",
+                                    "--force")[0]["result"]
+                self.assertLessEqual(result["hausdorff_percent"]["upper"], 1)
+                self.assertEqual(result["self_intersections"], 0)
+
+
 @unittest.skipUnless(MESHES.is_dir(), f"no real organs in {MESHES}")
 class Organs(Case):
+    def test_a_tolerance_holds_whatever_the_order_of_the_vertices(self):
+        """A gallbladder with the rest of its duct, and a stomach with a dent."""
+        for name in ("sofaenv_gallbladder.stl", "openhelp_stomach.stl"):
+            surface = self.path("surface.ply")
+            self.run_tool("decimate", MESHES / name, surface, "--max-error", "0.001%", "--mesh-unit", "mm", "--force")
+            mesh = Ply(surface)
+            order = np.random.default_rng(1).permutation(len(mesh.vertices))
+            place = np.argsort(order)
+            for vertices, triangles in ((mesh.vertices, mesh.triangles), (mesh.vertices[order], place[mesh.triangles])):
+                write_ply(surface, vertices, triangles)
+                result = self.relax(surface, surface, self.path("shell.ply"), "--tolerance", "1%", "--force")[0]["result"]
+                self.assertLessEqual(result["hausdorff_percent"]["upper"], 1, name)
+                self.assertEqual(result["self_intersections"], 0, name)
+
     def test_an_open_aorta_within_a_percent_takes_no_more_shells_than_well_shaped_flat_triangles(self):
         target, unit = MESHES / "vmtk_aorta_open.stl", ["--mesh-unit", "mm"]
         flat = self.run_tool("decimate", target, "flat.ply", *unit, "--max-error", "1%", "--min-angle", 20)

@@ -47,6 +47,14 @@ class AccuracyTest(SimulateTest):
         self.assertEqual([entry["path"] for entry in report["outputs"]], ["out.hdf", "out.page", "fine.ply"])
         self.assertEqual([entry["path"] for entry in report["inputs"]], ["ball.ply", "target.ply"])
 
+    def test_few_shells_may_lie_farther_from_what_they_were_fitted_to(self):
+        """A fortieth of the diagonal away is what twenty shells leave of a surface, and another surface for many."""
+        write_ply(self.path("around.ply"), *sphere(5, 10.95)[:2])
+        for level, code, says in ((0, 0, ""), (2, 3, "is not the surface that they were fitted to")):
+            vertices, triangles, normals = sphere(level, 10)
+            write_ply(self.path("few.ply"), vertices, triangles, normals)
+            self.run_tool("few.ply", "out.hdf", *HELD, "--target", "around.ply", "--force", code=code, says=says)
+
     def test_the_border_of_a_load_is_part_of_the_claim(self):
         self.write("scene.toml", """
 [run]

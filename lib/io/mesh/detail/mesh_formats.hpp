@@ -17,12 +17,14 @@ MeshFile read_stl(std::string_view bytes, const std::string& name);
 MeshFile read_off(std::string_view bytes, const std::string& name);
 MeshFile read_glb(std::string_view bytes, const std::string& name);
 
-/// The world axes that a text names anywhere, as in "3D Slicer output. SPACE=LPS": "LPS" or "RAS", in any case and also
-/// in full ("right-anterior-superior"); not as a part of other words. Errors: InputError when it names both.
-std::optional<std::string> space_in(std::string_view text, const std::string& name);
-
-/// Notes the world axes that a comment, header or name in the file says. Errors: InputError when it said others before.
+/// Notes the world axes that a comment, header or name in the file says anywhere, as in "3D Slicer output. SPACE=LPS":
+/// "LPS" or "RAS", in any case and also in full ("right-anterior-superior"); not as a part of other words.
+/// Errors: InputError when it says two of them, here or before.
 void take_space(MeshFile& file, std::string_view text, const std::string& name);
+
+/// The same, and the unit of length: "units mm", "UNITS=cm", "File units = millimeters". Units that are not understood
+/// are left to read_mesh(). Errors: InputError as take_space().
+void take_frame(MeshFile& file, std::string_view text, const std::string& name);
 
 /// Gathers the faces of a file and turns them into triangles in the order of the faces.
 class FaceCollector {

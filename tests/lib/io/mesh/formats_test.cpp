@@ -1,6 +1,9 @@
 #include "io/mesh/helpers.hpp"
+#include "tunica/io/mesh/surface_file.hpp"
 
 #include <gmock/gmock.h>
+
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
@@ -250,7 +253,7 @@ TEST(Glb, HasAsManyNodesAsItLikes) {
             4U * (count - 1));
 }
 
-TEST(MeshFile, AsksForTheUnitOfFormatsThatCarryNone) {
+TEST(MeshFile, AsksForTheUnitOfFilesThatSayNone) {
   const TemporaryFolder folder;
   const auto asks = [&](const std::string& name, const std::string& bytes) {
     const auto path = folder.file(name, bytes);
@@ -314,6 +317,70 @@ TEST(Space, OneFileSaysOne) {
   EXPECT_THAT(test::refusal(folder, "# SPACE=RAS\n# SPACE=LPS\n" + test::tetrahedron_obj, "a.obj"),
               HasSubstr("says both"));
   EXPECT_THAT(test::refusal(folder, test::binary_stl("SPACE=RAS SPACE=LPS"), "a.stl"), HasSubstr("says both"));
+}
+
+/// What a file of these bytes says of its unit, and its second vertex in mm.
+std::string unit_of(const TemporaryFolder& folder, const std::string& name, const std::string& bytes) {
+  const MeshFile file = read_mesh(folder.file(name, bytes), {}, false);
+  return file.units.value_or("none") + fmt::format(" {}", file.mesh.vertices.at(1).cwiseAbs().maxCoeff());
+}
+
+TEST(Unit, IsReadWhereverAFormatHasRoomForIt) {
+  const TemporaryFolder folder;
+  for (const auto& [text, unit] : {std::pair("units cm", "cm 10"),
+                                   {"UNITS=cm", "cm 10"},
+                                   {"a program. File units = centimetres", "cm 10"},
+                                   {"unit: Micron", "um 0.001"},
+                                   {"all units are millimeters.", "mm 1"},
+                                   {"SPACE=LPS; units=m; by hand", "m 1000"},
+                                   {"SPACE=RAS UNITS=  mm COLOR=red", "mm 1"},
+                                   {"units 'cm', by hand", "cm 10"},
+                                   {"{\"unit\": \"M\"}", "m 1000"}}) {
+    const std::string comment = fmt::format("# {}\n", text);
+    EXPECT_EQ(unit_of(folder, "a.obj", comment + test::tetrahedron_obj), unit);
+    EXPECT_EQ(unit_of(folder, "a.stl", test::binary_stl(text)), unit);
+    EXPECT_EQ(unit_of(folder, "b.stl", with(test::ascii_stl(), "a name with words", text)), unit);
+    EXPECT_EQ(unit_of(folder, "a.off", with(test::tetrahedron_off, "made by hand", text)), unit);
+    EXPECT_EQ(unit_of(folder, "b.off", with(test::tetrahedron_off, "OFF", fmt::format("OFF # {}", text))), unit);
+    EXPECT_EQ(unit_of(folder, "a.ply",
+                      fmt::format("ply\nformat ascii 1.0\ncomment {}\nelement vertex 3\n"
+                                  "property double x\nproperty double y\nproperty double z\n"
+                                  "element face 1\nproperty list uchar int vertex_indices\n"
+                                  "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+                                  text)),
+              unit);
+  }
+  for (const char* text :
+       {"unit normals", "units of the scanner: mm", "subunit = cm", "unity mm", "unit m of the house",
+        "units=", "units", "unit: none", "velocity, unit: m/s", "pressure unit: mm Hg", "unit: mm Hg", "time unit: m",
+        "colour units m", "the unit: m. Miller", "flow unit: cm3/s", "units: m m"}) {
+    EXPECT_EQ(unit_of(folder, "a.obj", fmt::format("# {}\n", text) + test::tetrahedron_obj), "none 1") << text;
+  }
+}
+
+TEST(Unit, OfAFileIsOneThatIsUnderstoodAndHoldsAgainstAnother) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(test::refusal(folder, "# units mm\n# unit: m\n" + test::tetrahedron_obj, "a.obj"),
+              HasSubstr("contradict each other"));
+  EXPECT_THAT(test::refusal(folder, test::binary_stl("UNITS=inch"), "a.stl"), HasSubstr("its unit is inches, which"));
+  const auto path = folder.file("b.obj", "# units mm\n" + test::tetrahedron_obj);
+  const MeshFile file = read_mesh(path, 1000.0);
+  EXPECT_EQ(file.mesh.vertices.at(1).cwiseAbs().maxCoeff(), 1);
+  EXPECT_THAT(test::message_of<InputError>([&] { require_no_other_unit(file, 1000.0, path); }),
+              HasSubstr("do not state another one"));
+  ASSERT_TRUE(unit_note(file, path, 1000.0));
+  EXPECT_THAT(unit_note(file, path, 1000.0)->text, HasSubstr("says that its unit is mm, and is taken in that"));
+  EXPECT_FALSE(unit_note(file, path, 1.0));
+}
+
+/// What is written in mm is read in mm, whatever is stated for files that say no unit.
+TEST(Unit, IsWrittenByEveryFormatThatIsRead) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = read_mesh(folder.file("t.obj", test::tetrahedron_obj)).mesh;
+  for (const char* name : {"a.ply", "a.obj", "a.stl", "a.glb"}) {
+    write_surface(folder / name, mesh, {});
+    EXPECT_NEAR(read_mesh(folder / name, {}, true).mesh.vertices.at(1).cwiseAbs().maxCoeff(), 1, 1e-6) << name;
+  }
 }
 
 TEST(Glb, IsInTheUnitThatIsStated) {
