@@ -47,6 +47,17 @@ class Doubtful(SimulateTest):
                        load("pressure", "1Pa", more=where))
             self.assertEqual("the region is small beside the shells" in " ".join(self.warned("--scene", "small.toml")), small)
 
+    def test_fillings_that_leave_out_some_of_the_volume(self):
+        """The chords of large tetrahedra cut off what a ball of small triangles has outside of them."""
+        write_ply(self.path("round.ply"), *sphere(4, 10)[:2])
+        for size, short in (("5mm", True), ("1.5mm", False)):
+            self.write("filled.toml", run_lines(kind="static") +
+                       f'[[solid]]\nname = "s"\nfill = "round.ply"\nsize = "{size}"\nyoung = "1MPa"\npoisson = 0.3\n'
+                       '[[fix]]\nbody = "s"\nwhere = {below = {axis = "z", at = "-8mm"}}\ntranslation = "xyz"\n'
+                       '[[load]]\nbody = "s"\nkind = "force"\nwhere = {above = {axis = "z", at = "8mm"}}\nvalue = ["0N", "0N", "1mN"]\n')
+            told = " ".join(self.warned("--scene", "filled.toml"))
+            self.assertEqual("mm3 that the surface encloses" in told, short, told)
+
     def test_strips_that_are_joined_along_a_line_have_a_hinge(self):
         vertices, triangles = grid(10, 4, 20, 8)
         write_ply(self.path("one.ply"), vertices, triangles)
