@@ -9,7 +9,7 @@
 #include "tunica/io/file/output_file.hpp"
 #include "tunica/io/mesh/mesh_file.hpp"
 #include "tunica/io/mesh/mesh_pair.hpp"
-#include "tunica/io/mesh/voxel_comments.hpp"
+#include "tunica/io/mesh/provenance_comments.hpp"
 #include "tunica/io/result/page_file.hpp"
 #include "tunica/io/result/result_export.hpp"
 #include "tunica/io/result/result_file.hpp"

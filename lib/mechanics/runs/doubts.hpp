@@ -25,6 +25,7 @@ bool is_loaded(const Model& model);
 std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool has_estimates = false);
 
 /// Solids whose tetrahedra are coarse for what they bear. @param errors  ElementFields::solid_error of the state
+/// Errors: InputError: not one per solid. Cost: none.
 std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors);
 
 /// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".

@@ -6,6 +6,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/require.hpp"
 #include "tunica/core/threads.hpp"
+#include "tunica/shell/patch/detail/pieces.hpp"
 #include "tunica/shell/patch/shape_function.hpp"
 #include "tunica/surface/mesh/checks.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
@@ -63,11 +64,6 @@ double largest_product_sum(double a, double b, double c) {
 
 /// flatness() at level 1; level m divides it by m^2.
 double coarsest_flatness(const CubicPatch& patch) { return flatness(patch, {Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)}); }
-
-/// Pieces per edge for which flatness() is at most `deviation`.
-double level_for(const CubicPatch& patch, double deviation) {
-  return std::max(1.0, std::ceil(std::sqrt(coarsest_flatness(patch) / deviation * (1 + 1e-12))));
-}
 
 std::array<Vec3, 3> corners_of(const ShellMesh& shell, std::size_t t) {
   const auto& v = shell.triangles[t];
@@ -426,11 +422,24 @@ double flatness(const CubicPatch& patch, const std::array<Vec2, 3>& piece) {
 
 double flatness(const CubicPatch& patch, int level) { return coarsest_flatness(patch) / (real(level) * real(level)); }
 
+double pieces_for(const CubicPatch& patch, double deviation) {
+  return std::max(1.0, std::ceil(std::sqrt(coarsest_flatness(patch) / deviation * (1 + 1e-12))));
+}
+
+void require_few_triangles(double triangles, std::size_t most, double deviation) {
+  if (!(triangles <= real(most))) {
+    throw RequirementError(
+        fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
+                    "allow a larger deviation",
+                    deviation, most));
+  }
+}
+
 double tessellation_size(const ShellMesh& shell, double deviation) {
   require_positive(deviation, "the deviation of the fine triangles");
   double total = 0;
   for (const CubicPatch& patch : curved_patches(shell)) {
-    total += std::pow(level_for(patch, deviation), 2);
+    total += std::pow(pieces_for(patch, deviation), 2);
   }
   return total;
 }
@@ -441,14 +450,9 @@ Tessellation tessellate(const ShellMesh& shell, double deviation, std::size_t mo
   std::vector<int> levels(patches.size());
   double total = 0;
   for (std::size_t t = 0; t < patches.size(); ++t) {
-    const double level = level_for(patches[t], deviation);
+    const double level = pieces_for(patches[t], deviation);
     total += level * level;
-    if (!(total <= real(most_triangles))) {
-      throw RequirementError(
-          fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
-                      "allow a larger deviation",
-                      deviation, most_triangles));
-    }
+    require_few_triangles(total, most_triangles, deviation);
     levels[t] = truncated<int>(level);
   }
   return tessellate_by(shell, patches, levels);

@@ -4,8 +4,7 @@
 #include "tunica/core/narrow.hpp"
 #include "tunica/core/progress.hpp"
 #include "tunica/core/require.hpp"
-
-#include <fmt/format.h>
+#include "tunica/shell/patch/detail/pieces.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -129,16 +128,11 @@ std::vector<int> pieces_inside(const ShellMesh& shell, const std::vector<CubicPa
   double total = 0;
   const auto refine = [&](std::size_t t, double pieces) {
     total += pieces * pieces;
-    if (!(total <= real(most_triangles))) {
-      throw RequirementError(
-          fmt::format("the curved surface within {:.3g} mm would need more than {} fine triangles; "
-                      "allow a larger deviation",
-                      deviation, most_triangles));
-    }
+    require_few_triangles(total, most_triangles, deviation);
     inside[t] = std::max(coarsest, truncated<int>(pieces));
   };
   for (std::size_t t = 0; t < patches.size(); ++t) {
-    refine(t, std::ceil(std::sqrt(flatness(patches[t], 1) / deviation * (1 + 1e-12))));
+    refine(t, pieces_for(patches[t], deviation));
   }
   for (bool again = true; again;) {
     again = false;

@@ -55,18 +55,24 @@ Bent bent(std::size_t n, SolidLaw law, bool linear) {
 
 double cantilever(std::size_t n, SolidLaw law, bool linear) { return bent(n, law, linear).deflection; }
 
-/// A bar pulled to twice its length, all of it by the same: Green's strain is (4 - 1) / 2, and what its sides contract.
+/// A unit cube, E = 1 MPa, Poisson's ratio 0, pulled along x by so much, all of it by the same.
+Model pulled_cube(SolidLaw law, double by) {
+  Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1, 0, law);
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.y() < eps; }, "y");
+  hold_nodes(
+      model, 0, [](const Vec3& x) { return x.z() < eps; }, "z");
+  move_nodes(
+      model, 0, [](const Vec3& x) { return x.x() > 1 - eps; }, [&](const Vec3&) { return Vec3(by, 0, 0); });
+  return model;
+}
+
+/// At twice the length Green's strain is (4 - 1) / 2.
 TEST(SolidBody, SaysHowFarItIsStrainedBeyondItsLaw) {
   for (const SolidLaw law : {SolidLaw::corotational, SolidLaw::neo_hookean}) {
-    Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1, 0, law);
-    hold_nodes(
-        model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
-    hold_nodes(
-        model, 0, [](const Vec3& x) { return x.y() < eps; }, "y");
-    hold_nodes(
-        model, 0, [](const Vec3& x) { return x.z() < eps; }, "z");
-    move_nodes(
-        model, 0, [](const Vec3& x) { return x.x() > 1 - eps; }, [](const Vec3&) { return Vec3(1, 0, 0); });
+    const Model model = pulled_cube(law, 1);
     const double strain =
         element_fields(model, last_state(model, nonlinear_run({0.25, 0.5, 0.75, 1}))).solid_strain_p99;
     EXPECT_NEAR(strain, law == SolidLaw::corotational ? 1.5 : 0, 0.1);
@@ -96,15 +102,7 @@ TEST(SolidCantilever, ItsErrorIsEstimatedByTheJumpsOfStress) {
 
 /// A stress that is the same everywhere does not jump.
 TEST(SolidBody, AConstantStressHasNoError) {
-  Model model = one_solid(make_block(2, 2, 2, [](const Vec3& u) { return u; }), 1000, 0, SolidLaw::neo_hookean);
-  hold_nodes(
-      model, 0, [](const Vec3& x) { return x.x() < eps; }, "x");
-  hold_nodes(
-      model, 0, [](const Vec3& x) { return x.y() < eps; }, "y");
-  hold_nodes(
-      model, 0, [](const Vec3& x) { return x.z() < eps; }, "z");
-  move_nodes(
-      model, 0, [](const Vec3& x) { return x.x() > 1 - eps; }, [](const Vec3&) { return Vec3(0.3, 0, 0); });
+  const Model model = pulled_cube(SolidLaw::neo_hookean, 0.3);
   const ElementFields fields = element_fields(model, last_state(model, nonlinear_run({1})));
   EXPECT_LT(fields.solid_error.at(0), 1e-12);
   EXPECT_THAT(doubts_of_solids(model, fields.solid_error), ::testing::IsEmpty());
