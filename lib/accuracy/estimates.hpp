@@ -25,9 +25,9 @@ double error_of_last(std::span<const double> values);
 Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool doubtful);
 
 /// The error of a static run by one solution on shells split in four and fitted to the targets: a change D leaves 4/3 D
-/// by second order; of a 99th percentile it is the largest change of what 2, 1 and .5 % of the area pass, for one alone
-/// may be small by chance. Credible below a quarter, but for the largest stress and strain. None, and `reason`, where
-/// the finer mesh has no answer.
+/// by second order, 2 D of stress and strain at the faces, which are of the first; of a 99th percentile it is the
+/// largest change of what 2, 1 and .5 % of the area pass, for one alone may be small by chance. Credible below a
+/// quarter, but for the largest stress and strain. None, and `reason`, where the finer mesh has no answer.
 /// @param fields  of `state`
 /// @param targets  one for each body; null: splits lie on the body's own patches
 /// @param model_of  as in solve_within()

@@ -235,9 +235,10 @@ bool require_own_target(const ShellMesh& shell, const Target& target, const fs::
   const std::size_t facets = target.mesh().triangles.size();
   const bool is_finer = facets >= facets_per_shell * shell.triangles.size();
   if (!is_finer && needed) {
-    throw InputError(
-        fmt::format("{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to",
-                    path.string(), facets, shell.triangles.size()));
+    throw InputError(fmt::format(
+        "{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to; where "
+        "there is none finer, take fewer shells (SHELLS={})",
+        path.string(), facets, shell.triangles.size(), facets / facets_per_shell));
   }
   const double farthest =
       std::max(farthest_mean * target.diagonal(),
@@ -651,7 +652,6 @@ LoadedRun load_run(const SimulateSettings& settings, const Context& context) {
   loaded.model = std::move(read.model);
   loaded.space = std::move(read.space);
   read_targets(settings, loaded, context);
-  std::ranges::for_each(read.notes, context.note);
   std::ranges::for_each(read.warnings, context.warn);
   for (std::size_t b = 0; scene.accuracy && b < loaded.targets.size(); ++b) {
     if (!loaded.targets[b] && loaded.model.shells[b].curved && !loaded.on_own_patches) {
@@ -682,6 +682,7 @@ void simulate(SimulateSettings settings, LoadedRun loaded, RunRecord& record, co
   const bool has_estimates = record.accuracy || may_refine(settings, loaded) || settings.target;
   std::ranges::for_each(doubts(system->model(), scene.run, has_estimates), context.warn);
   std::ranges::for_each(doubts_of_ends(system->model()), context.warn);
+  std::ranges::for_each(doubts_of_loose_bodies(system->model(), scene.run), context.warn);
   if (settings.check) {
     return;
   }

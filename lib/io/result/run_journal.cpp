@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 8\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 9\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;
@@ -208,10 +208,10 @@ void checkpoint_members(Archive& archive, AnyCheckpoint& checkpoint) {
   auto& [summary, position, displacement, rotation, solid_pressure, contact, increment, rates] = checkpoint;
   auto& [dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound, volume_before,
          volume_after, strain, largest, departure, seconds_per_step, frequencies, factors, stiffened, energy, bend,
-         motion, snaps, limits, branches, unstable, contact_pressures] = summary;
+         motion, snaps, limits, branches, short_of, unstable, contact_pressures] = summary;
   each(archive, dof, steps, parts, converged, residual, newton_iterations, cg_iterations, error, error_is_bound,
        volume_before, volume_after, strain, largest, departure, seconds_per_step, frequencies, factors, stiffened,
-       energy, bend, motion, snaps, limits, branches, unstable, contact_pressures);
+       energy, bend, motion, snaps, limits, branches, short_of, unstable, contact_pressures);
   each(archive, position, displacement, rotation, solid_pressure, contact, increment, rates);
 }
 

@@ -538,16 +538,16 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, 
                        "begin farther apart than the resolution of their contact"
                      : "take shorter steps, or a smaller spectral_radius")});
   }
-  constexpr double notable_loss = 0.1;
+  constexpr double notable_loss = 0.05;
   if (energy.lost > notable_loss * energy.largest) {
     warnings.push_back(
         {Weight::minor, "long steps",
-         fmt::format(
-             "time integration took {:.3g} % of the energy: the amplitudes of the motion are too small, the state of "
-             "rest is right. For the motion take shorter steps, or {}",
-             1e2 * energy.lost / energy.largest,
-             integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\""
-                                                      : "a larger spectral_radius")});
+         fmt::format("time integration took {:.3g} % of the energy: what swings does so too little, what falls is "
+                     "ahead by about "
+                     "as much; the state of rest is right. For the motion take shorter steps, or {}",
+                     1e2 * energy.lost / energy.largest,
+                     integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\" in a scene"
+                                                              : "a larger spectral_radius")});
   }
   return warnings;
 }
@@ -619,6 +619,13 @@ std::vector<Warning> run_warnings(const RunSettings& run, const Summary& summary
   }
   if (auto snap = snap_warning(summary)) {
     warnings.push_back(*std::move(snap));
+  }
+  if (summary.short_of_factor) {
+    warnings.push_back(
+        {Weight::major, "partial path",
+         fmt::format("the path took all of its {} steps and ended at load factor {:.4g}: the numbers are "
+                     "those of that load: more steps (max_steps) go on",
+                     summary.steps, *summary.short_of_factor)});
   }
   if (summary.ends_unstable) {
     warnings.push_back({Weight::major, "unstable state", unstable_text(summary)});

@@ -202,10 +202,10 @@ ShellBody load_shell(const SceneShell& shell, BodyFindings& found) {
   if (!body.curved) {
     make_flat(body.mesh);
     if (shell.rest == Rest::curved) {
-      found.notes.push_back(
-          fmt::format("{}: has no normals, so its flat facets are the shell (as rest = \"flat\"); "
-                      "tunica-relax makes curved shells",
-                      shell.mesh.string()));
+      found.warnings.push_back({Weight::note, "flat facets",
+                                fmt::format("{}: has no normals, so its flat facets are the shell (as rest = "
+                                            "\"flat\"); tunica-relax makes curved shells",
+                                            shell.mesh.string())});
     }
   }
   body.thickness = thickness_of(shell, read.file);
@@ -230,7 +230,9 @@ SolidBody load_solid(const SceneSolid& solid, BodyFindings& found) {
       return read;
     });
     body.mesh = std::move(file.mesh);
-    found.notes.insert(found.notes.end(), file.notes.begin(), file.notes.end());
+    for (const std::string& note : file.notes) {
+      found.warnings.push_back({Weight::note, "tetrahedra mended", note});
+    }
   }
   return body;
 }

@@ -127,9 +127,10 @@ std::vector<std::pair<double, Value>> read_pairs(const SceneTable& table, const 
     const bool load_factor = !over_time && (when.is_integer() || when.is_floating_point());
     const double time = load_factor ? read_number(table, when, key) : read_quantity(table, when, key, dimension::time);
     if (!over_time && !load_factor && pairs.empty()) {
-      scene.notes.push_back(
-          fmt::format("{}: a static run has no time: the {} is read over the load factor, 1s as factor 1",
-                      table.at(list).text, key));
+      scene.warnings.push_back(
+          {Weight::note, "time in a static run",
+           fmt::format("{}: a static run has no time: the {} is read over the load factor, 1s as factor 1",
+                       table.at(list).text, key)});
     }
     if (!pairs.empty() && !(time > pairs.back().first)) {
       table.at(when).fail(fmt::format("the times of {} must increase", key));

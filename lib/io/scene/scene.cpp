@@ -322,7 +322,7 @@ void warn_of_hinge(const Model& model, const Attachment& attachment, std::vector
 LoadedScene load_scene(const Scene& scene) {
   require_load(scene);
   BodyFindings found;
-  found.notes = scene.notes;
+  found.warnings = scene.warnings;
   SceneBodies bodies;
   for (const SceneShell& shell : scene.shells) {
     bodies.shells.push_back(load_shell(shell, found));
@@ -333,8 +333,7 @@ LoadedScene load_scene(const Scene& scene) {
   for (const SceneRigid& rigid : scene.rigids) {
     bodies.rigids.push_back(load_rigid(rigid, found));
   }
-  LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.notes), std::move(found.warnings),
-                     found.space};
+  LoadedScene loaded{resolve_scene(scene, std::move(bodies)), std::move(found.warnings), found.space};
   warn_of_far_points(scene, loaded.model, loaded.warnings);
   // The levels of an accuracy place a region better and better, and say by how much its area still changes.
   for (std::size_t i = 0; !scene.accuracy && i < loaded.model.supports.size(); ++i) {

@@ -177,7 +177,7 @@ struct Scene {
   std::vector<SceneAttach> attachments;
   std::vector<SceneContact> contacts;
   std::vector<SceneProbe> probes;
-  std::vector<std::string> notes;  ///< what was understood in a way that the user should know
+  std::vector<Warning> warnings;  ///< what was understood in a way that the user should know
 };
 
 /// The files of meshes that a scene names, each once, in the order of its bodies.
@@ -202,7 +202,6 @@ bool holds_for_finer_meshes(const Scene& scene);
 
 struct LoadedScene {
   Model model;
-  std::vector<std::string> notes;    ///< of the scene and of its meshes (flat facets)
   std::vector<Warning> warnings;     ///< of its meshes: which way they face, where they are open unawares
   std::optional<std::string> space;  ///< world axes, of the first mesh that says them
 };

@@ -53,9 +53,10 @@ void settle(const SceneTable& table, SceneContact& contact) {
     contact.name = fmt::format("{}-{}", contact.between[0], contact.between[1]);
   }
   if (!contact.consistent) {
-    table.source().scene.notes.push_back(
-        fmt::format("{}: transfer = \"paper\" loses moments: forces between \"{}\" and \"{}\" are not in balance",
-                    table.place("transfer").text, contact.between[0], contact.between[1]));
+    table.source().scene.warnings.push_back(
+        {Weight::minor, "unbalanced contact",
+         fmt::format("{}: transfer = \"paper\" loses moments: forces between \"{}\" and \"{}\" are not in balance",
+                     table.place("transfer").text, contact.between[0], contact.between[1])});
   }
 }
 
@@ -69,15 +70,17 @@ SceneTable read_item(const toml::table& node, SceneSource& source, const std::st
   return table;
 }
 
-/// Says of each rigid body that touches nothing that it does nothing.
-void note_idle_rigids(Scene& scene) {
+/// Says of each rigid body that no contact names that all goes through it.
+void doubt_idle_rigids(Scene& scene) {
   for (const SceneRigid& rigid : scene.rigids) {
     const bool touches = std::any_of(scene.contacts.begin(), scene.contacts.end(), [&](const SceneContact& contact) {
       return contact.between[0] == rigid.name || contact.between[1] == rigid.name;
     });
     if (!touches) {
-      scene.notes.push_back(
-          fmt::format("{}: no [[contact]] names \"{}\", so it does nothing", rigid.places.item.text, rigid.name));
+      scene.warnings.push_back(
+          {Weight::major, "no contact",
+           fmt::format("{}: no [[contact]] names \"{}\", so all goes through it: add one, or take it out",
+                       rigid.places.item.text, rigid.name)});
     }
   }
 }
@@ -155,7 +158,7 @@ Scene parse_scene(const std::string& text, const fs::path& name) {
   settle_until(scene);
   settle_solver(scene);
   check_scene(scene);
-  note_idle_rigids(scene);
+  doubt_idle_rigids(scene);
   return scene;
 }
 

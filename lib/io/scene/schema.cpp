@@ -391,7 +391,7 @@ SceneKeys<SceneFix> fix_keys() {
       key("translation", &Fix::translation, form::axes(), "held components in world axes, \"\" for none")
           .needed(axes_are_said),
       key("rotation", &Fix::rotation, form::axes(),
-          "likewise, of a shell's nodes, where it is needed; ends that are pulled hold it about the wall's normal, too")
+          "likewise, of a shell's nodes, where it is needed; a plane of symmetry across z: translation z, rotation xy")
           .without_default(),
       key("displacement", &Fix::displacement, form::vector(dimension::length, "m", R"(["0mm", "0mm", "1mm"])"),
           "prescribed instead of held")

@@ -47,7 +47,8 @@ LaneVec3 curved_strain(const ElementLanes& element, const std::array<LaneMat3, 3
       const LaneMat3& carrier = relative[corner_at(k, end)];
       edge.normal[e] = carrier * element.edge_normals.col(k);
       edge.side[e] = carrier * element.edge_sides.col(k);
-      change[2 * k + end] = element.rest_normals[2 * k + end] - edge.direction.dot(edge.normal[e]);
+      change[2 * k + end] =
+          element.bending_edges[k] * (element.rest_normals[2 * k + end] - edge.direction.dot(edge.normal[e]));
       turn[end] = element.rest_sides[2 * k + end] - edge.direction.dot(edge.side[e]);
     }
     strain += element.bow.col(k) * (turn[1] - turn[0]);

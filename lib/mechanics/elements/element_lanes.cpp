@@ -55,7 +55,7 @@ void add_curved_derivatives(const ElementLanes& element, const Kinematics& now, 
       return LaneVec3((carried - edge.direction * edge.direction.dot(carried)) / edge.length);
     };
     for (int end = 0; end < 2; ++end) {
-      const LaneVec3& normal = edge.normal[end];
+      const LaneVec3 normal = element.bending_edges[k] * edge.normal[end];
       auto row = d.slopes.row(2 * k + end);
       row.segment<3>(6 * next_corner(k)) = -across(normal).transpose();
       row.segment<3>(6 * k) = across(normal).transpose();
@@ -302,6 +302,7 @@ void find_resultants(const ElementLanes& element, const Kinematics& now, const L
     for (int k = 0; k < 3; ++k) {
       on_slopes[2 * k] += of.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
       on_slopes[2 * k + 1] += -of.on_sides[k] * now.tilts[k] + 0.5 * stress[12 + k];
+      on_slopes.segment<2>(2 * k) *= element.bending_edges[k];
       const LaneVec2 on_bending = 0.5 * of.on_sides[k] * now.bulges[k] * element.edge_directions.col(k);
       stress.segment<2>(3 + 3 * k) += on_bending;
       stress.segment<2>(3 + 3 * next_corner(k)) += on_bending;
@@ -406,6 +407,7 @@ void gather(const ElementGroup& elements, ElementLanes& lanes) {
   pack(&ShellElement::rest_normals, lanes.rest_normals);
   pack(&ShellElement::rest_sides, lanes.rest_sides);
   pack(&ShellElement::bow, lanes.bow);
+  pack(&ShellElement::bending_edges, lanes.bending_edges);
   pack(&ShellElement::height_weights, lanes.height_weights);
   pack(&ShellElement::sideways, lanes.sideways);
   pack(&ShellElement::tilts, lanes.tilts);

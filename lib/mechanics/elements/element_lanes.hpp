@@ -24,6 +24,7 @@ struct ElementLanes {
   LaneVector6 rest_normals;
   LaneVector6 rest_sides;
   LaneMat3 bow;
+  LaneVec3 bending_edges;
   LaneVector6 height_weights;
   std::array<LaneMatrix6, 3> bulging;
   LaneMat3 sideways;

@@ -75,7 +75,10 @@ struct ShellElement {
   Vector6 slopes;        ///< of the reference: start and end of every edge
   Vector6 rest_normals;  ///< e.m and e.c there: what round-off leaves of zero, so that the reference is exactly at rest
   Vector6 rest_sides;
-  Mat3 bow;             ///< columns: strain per difference of the in-plane rotations at the ends of an edge
+  Mat3 bow;  ///< columns: strain per difference of the in-plane rotations at the ends of an edge
+  /// Of the edges: by how much their slopes follow the rotations of their ends; 0: an edge that is held keeps its
+  /// shape.
+  Vec3 bending_edges = Vec3::Ones();
   bool curved = false;  ///< the slopes count: in the strain by bulging, in the height of the patch
   /// Mean height of the patch over the facet: sum of weight x length of the edge x slope.
   Vector6 height_weights;

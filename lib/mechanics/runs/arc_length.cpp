@@ -19,6 +19,8 @@ constexpr double chord_of_factor = 0.002;
 constexpr double chord_of_displacement = 0.005;
 /// A step whose chord departs by this many times more is taken again, shorter.
 constexpr double retry_limit = 6;
+/// A state that departs from where the tangents at both ends lead, by this part of the step, lies on another path.
+constexpr double other_path = 0.5;
 /// Steps are not cut below this part of the path so far.
 constexpr double smallest_step = 1e-6;
 constexpr std::size_t wanted_iterations = 4;
@@ -208,6 +210,9 @@ public:
   Summary run(const Progress& progress) {
     Summary summary = follow(progress);
     require_goal();
+    if (!ended_ && run_.max_factor) {
+      summary.short_of_factor = now_.factor;
+    }
     return summary;
   }
 
@@ -279,12 +284,34 @@ private:
     if (!path_.find_state(from, step, state)) {
       return false;
     }
+    const std::vector<Vec3> displacement = state.configuration.displacement;
     for (const Piece& piece : system_.pieces) {
       if (only_follows_ && piece.balanced) {
         take_out_rigid_motion(system_, piece, state.configuration);
       }
     }
-    return path_.find_direction(state, from.direction);
+    return path_.find_direction(state, from.direction) && leads_to(from, step, displacement, state);
+  }
+
+  /// Whether a path can lead from the one state to the other, for a plane ahead may meet others, too: its mean tangent
+  /// does so to second order, it sets out towards the load, and where the factor turns a mode changes its stability.
+  /// @param displacement  of the second one, with its rigid motion
+  [[nodiscard]] bool leads_to(const PathState& a, double step, const std::vector<Vec3>& displacement,
+                              const PathState& b) const {
+    double missed = 0, moved = 0;
+    for (std::size_t i = 0; i < system_.node_count(); ++i) {
+      const auto slope = [&](const PathState& state) { return state.direction.segment<3>(first_freedom(i)); };
+      const Vec3 led = step / 2 * (slope(a) + slope(b));
+      missed += (displacement[i] - a.configuration.displacement[i] - led).squaredNorm();
+      moved += std::max(slope(a).squaredNorm(), slope(b).squaredNorm()) * step * step;
+    }
+    const double factor_led = step / 2 * (a.factor_slope + b.factor_slope);
+    const double factor_moved = step * std::max(std::abs(a.factor_slope), std::abs(b.factor_slope));
+    const bool turns = a.factor_slope * b.factor_slope < 0;
+    const bool sets_out = summary_.steps > 0 || b.factor > a.factor;
+    return sets_out && (!turns || (a.negative_pivots + b.negative_pivots) % 2 == 1) &&
+           missed <= other_path * other_path * moved &&
+           std::abs(b.factor - a.factor - factor_led) <= other_path * factor_moved;
   }
 
   /// How far a straight line departs from the path between two states, in units of what is allowed.

@@ -1,3 +1,4 @@
+#include "tunica/core/disjoint_sets.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/require.hpp"
 #include "tunica/core/rounding.hpp"
@@ -557,19 +558,64 @@ void check_balance(const ShellSystem& system) {
   }
 }
 
-/// Contact holds what it presses on, and attachments what they carry.
-bool may_be_held_by_others(const ShellSystem& system, const Piece& piece) {
-  const Model& model = *system.model;
-  const auto names = [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; };
-  if (std::any_of(model.contacts.begin(), model.contacts.end(),
-                  [&](const Contact& c) { return names(c.between[0]) || names(c.between[1]); })) {
-    return true;
-  }
-  return std::any_of(system.carried.begin(), system.carried.end(), [&](const Carried& c) {
-    return std::binary_search(piece.nodes.begin(), piece.nodes.end(), c.node) ||
-           std::any_of(c.carriers.begin(), c.carriers.end(),
-                       [&](Index i) { return std::binary_search(piece.nodes.begin(), piece.nodes.end(), i); });
+/// Contact holds what it presses on.
+bool may_be_held_by_contact(const Model& model, const Piece& piece) {
+  return std::ranges::any_of(model.contacts, [&](const Contact& contact) {
+    return std::ranges::any_of(contact.between,
+                               [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; });
   });
+}
+
+/// Pieces that attachments join move as one; what is carried there holds nothing by itself.
+std::vector<std::vector<Piece>> joined_pieces(const ShellSystem& system) {
+  std::vector<std::size_t> piece_of(system.node_count(), 0);
+  for (std::size_t p = 0; p < system.pieces.size(); ++p) {
+    for (const Index node : system.pieces[p].nodes) {
+      piece_of[node] = p;
+    }
+  }
+  DisjointSets<std::size_t> joined(system.pieces.size());
+  std::vector<char> is_carried(system.node_count(), 0);
+  for (const Carried& carried : system.carried) {
+    is_carried[carried.node] = 1;
+    for (const Index carrier : carried.carriers) {
+      joined.join(piece_of[carried.node], piece_of[carrier]);
+    }
+  }
+  std::vector<std::vector<Piece>> groups(system.pieces.size());
+  for (std::size_t p = 0; p < system.pieces.size(); ++p) {
+    Piece piece = system.pieces[p];
+    std::erase_if(piece.nodes, [&](Index node) { return is_carried[node] != 0; });
+    if (!piece.nodes.empty()) {
+      groups[joined.root(p)].push_back(std::move(piece));
+    }
+  }
+  std::erase_if(groups, [](const auto& group) { return group.empty(); });
+  return groups;
+}
+
+/// A static run wants every rigid motion held, or touched by something that may hold it.
+void require_held(const ShellSystem& system) {
+  const Model& model = *system.model;
+  for (const std::vector<Piece>& group : joined_pieces(system)) {
+    if (std::ranges::any_of(group, [&](const Piece& piece) { return may_be_held_by_contact(model, piece); })) {
+      continue;
+    }
+    Piece whole;
+    for (const Piece& piece : group) {
+      whole.nodes.insert(whole.nodes.end(), piece.nodes.begin(), piece.nodes.end());
+    }
+    if (const int motions = free_rigid_motions(system, whole); motions > 0) {
+      const Index node = whole.nodes.front();
+      const std::size_t body = group.front().body;
+      refuse(
+          model, body,
+          fmt::format("the piece with node {} at {} can move freely{} ({} of its 6 rigid motions are not held): add a "
+                      "fix, or hold its rigid motions",
+                      node - model.first_node(body), place(system.reference[node]),
+                      group.size() > 1 ? ", with all that is attached to it" : "", motions));
+    }
+  }
 }
 
 }  // namespace
@@ -614,20 +660,7 @@ ShellSystem make_checked_system(const Model& model, const RunSettings& settings)
   }
   check_balance(system);
   if (finds_rest(model, settings)) {
-    for (const Piece& piece : system.pieces) {
-      if (may_be_held_by_others(system, piece)) {
-        continue;
-      }
-      const int motions = free_rigid_motions(system, piece);
-      if (motions > 0) {
-        const Index node = piece.nodes.front();
-        refuse(
-            model, piece.body,
-            fmt::format("the piece with node {} at {} can move freely ({} of its 6 rigid motions are not held): add a "
-                        "fix, or hold its rigid motions",
-                        node - model.first_node(piece.body), place(system.reference[node]), motions));
-      }
-    }
+    require_held(system);
   }
   return system;
 }

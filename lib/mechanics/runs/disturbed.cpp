@@ -207,13 +207,30 @@ void add_far_part(std::size_t shell, const std::array<double, 3>& d, std::vector
 
 }  // namespace
 
+std::optional<Vec3> plane_of_symmetry(const Fix& fix) {
+  if (fix.across) {
+    return fix.across;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto holds = [&](const std::array<bool, 3>& held, bool along) {
+      return std::ranges::all_of(std::array{0, 1, 2},
+                                 [&](int c) { return held[narrow<std::size_t>(c)] == ((c == axis) == along); });
+    };
+    if (holds(fix.translation, true) && holds(fix.rotation, false) && fix.displacement[axis] == 0) {
+      return Vec3(Vec3::Unit(axis));
+    }
+  }
+  return std::nullopt;
+}
+
 double slant_of_rim(const ShellBody& body, const Fix& fix) {
-  if (!fix.across) {
+  const std::optional<Vec3> plane = plane_of_symmetry(fix);
+  if (!plane) {
     return 0;
   }
   const std::set<Index> nodes(fix.nodes.begin(), fix.nodes.end());
   const CornerNormals normal(body.mesh, body.curved);
-  const Vec3 aside = fix.across->unitOrthogonal(), across = fix.across->cross(aside);
+  const Vec3 aside = plane->unitOrthogonal(), across = plane->cross(aside);
   double length = 0;
   Mat3 left = Mat3::Zero();
   Vec3 right = Vec3::Zero();
@@ -227,7 +244,7 @@ double slant_of_rim(const ShellBody& body, const Fix& fix) {
       const Vec3 terms(1, n.dot(aside), n.dot(across));
       length += part;
       left += part * terms * terms.transpose();
-      right += part * n.dot(*fix.across) * terms;
+      right += part * n.dot(*plane) * terms;
     }
   }
   if (!(length > 0)) {
@@ -263,7 +280,7 @@ std::vector<std::uint8_t> disturbed_nodes(const Model& model, std::size_t b) {
   };
   std::vector<std::uint8_t> slides(disturbed.size(), 0);  // as in a plane of symmetry: nothing bends there
   for (const Fix& fix : model.fixes) {
-    if (fix.body == b && fix.across && slant_of_rim(body, fix) <= negligible_slant) {
+    if (fix.body == b && plane_of_symmetry(fix) && slant_of_rim(body, fix) <= negligible_slant) {
       for (const Index node : fix.nodes) {
         slides[node] = 1;
       }

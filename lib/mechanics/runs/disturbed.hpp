@@ -5,17 +5,22 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 /// Where something other than the shape of a wall decides its stress.
 namespace tunica {
 
-/// How far the wall stands off a right angle to the plane in which a rim slides (Fix::across): the root mean square
+/// The normal of the plane in which a fix lets nodes slide as in a plane of symmetry: Fix::across, or the axis along
+/// which it holds translations at zero and about which alone it leaves rotations. None of other fixes.
+std::optional<Vec3> plane_of_symmetry(const Fix& fix);
+
+/// How far the wall stands off a right angle to the plane in which a rim slides: the root mean square
 /// along the rim of the sine of that angle, times sqrt(2): the angle at which a straight tube is cut. A vessel that
 /// goes on pulls at its rim in that plane as well. Where nothing does, what 1 % of the membrane stress of a straight
 /// tube under pressure exceeds is too large by .8 to 2.1 times that angle, at radii of 3 to 100 walls, however fine the
-/// mesh. 0: a rim as in a plane of symmetry, or none that slides. Errors: InputError: as require_valid() of the mesh.
-/// Cost: linear in the body.
+/// mesh. 0: a rim as in a plane of symmetry, or no plane_of_symmetry(). Errors: InputError: as require_valid() of the
+/// mesh. Cost: linear in the body.
 double slant_of_rim(const ShellBody& body, const Fix& fix);
 
 /// The slant up to which a rim that slides disturbs nothing.

@@ -117,23 +117,29 @@ void doubt_thickness(const ShellBody& body, std::vector<Warning>& found) {
   }
 }
 
-/// Of the area, where a face of the wall, half of it away from the middle, lies nearer to the middle of another part of
-/// the same wall than to its own: walls that overlap, and leave no lumen between them.
+/// Of the area, where a face of the wall, half of it away from the middle, lies nearer to the middle of a part of the
+/// same wall that lies along it than to its own: walls that overlap, and leave no lumen between them. At a crease they
+/// only meet.
 double share_overlapping(const ShellBody& body) {
   constexpr double nearer = 0.8;  // what noise and curvature take of the own distance
+  constexpr double along = 0.5;   // the cosine of 60 degrees
   const TriangleMesh mesh{body.mesh.vertices, body.mesh.triangles};
   const ClosestPoint middle(mesh);
+  const auto normal_of = [&](std::size_t t) -> Vec3 {
+    const auto& [a, b, c] = mesh.triangles[t];
+    return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).normalized();
+  };
   double whole = 0, overlapping = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& v = mesh.triangles[t];
-    const Vec3 &a = mesh.vertices[v[0]], &b = mesh.vertices[v[1]], &c = mesh.vertices[v[2]];
-    const Vec3 normal = (b - a).cross(c - a).normalized();
+    const Vec3 normal = normal_of(t), centre = (mesh.vertices[v[0]] + mesh.vertices[v[1]] + mesh.vertices[v[2]]) / 3;
     const double half = thickness_of(body, t) / 2;
     const double area = area_of(body.mesh, t);
     whole += area;
     const bool overlaps = std::ranges::any_of(std::array{-half, half}, [&](double away) {
-      return middle.closest((a + b + c) / 3 + away * normal, narrow<Index>(t)).squared_distance <
-             nearer * nearer * half * half;
+      const ClosestPoint::Hit hit = middle.closest(centre + away * normal, narrow<Index>(t));
+      return hit.squared_distance < nearer * nearer * half * half &&
+             std::abs(normal.dot(normal_of(hit.triangle))) > along;
     });
     overlapping += overlaps ? area : 0;
   }
@@ -291,8 +297,8 @@ double waves_of(const ShellBody& body) {
 
 /// What long shells and what waves leave of an answer adds up. The factors bound what is seen of balls of 60 to 1,000
 /// shells and a wall of R / 8 to R / 250, whose displacements come out too large, and of organs, whose stress at the
-/// faces comes out too low.
-void doubt_coarseness(const ShellBody& body, std::vector<Warning>& found) {
+/// faces comes out too low. Frequencies go with the root of the stiffness.
+void doubt_coarseness(const ShellBody& body, bool rings, std::vector<Warning>& found) {
   constexpr double notable_displacement = 0.25, notable_stress = 0.15;  // bounds: the errors are half of them
   const double bow = median_bow_share(body);
   const double waves = waves_of(body);
@@ -304,11 +310,17 @@ void doubt_coarseness(const ShellBody& body, std::vector<Warning>& found) {
   if (of_displacement > notable_displacement || of_stress > notable_stress) {
     found.push_back(
         {Weight::minor, "coarse shells",
-         fmt::format("{}: its shells are coarse for so thin a curved wall: displacements may be off by {}, and "
-                     "stress, at its faces and in the mean over the wall, by {}: take more shells, as far as the "
-                     "surface has them, or name the surface that they were fitted to (--target), by which the error of "
-                     "each number is estimated",
-                     named(body.said_at, body.name), up_to(of_displacement), up_to(of_stress))});
+         fmt::format(
+             "{}: its shells are coarse for so thin a curved wall: {}: take more shells, as far as the surface has "
+             "them{}",
+             named(body.said_at, body.name),
+             rings ? fmt::format("frequencies may be off by {}", up_to(of_displacement / 2))
+                   : fmt::format("displacements may be off by {}, and stress, at its faces and in the mean over the "
+                                 "wall, by {}",
+                                 up_to(of_displacement), up_to(of_stress)),
+             rings ? ""
+                   : ", or name the surface that they were fitted to (--target), by which the error of each number is "
+                     "estimated")});
   }
 }
 
@@ -327,37 +339,6 @@ std::vector<std::array<bool, 6>> held_freedoms(const Model& model, std::size_t b
     }
   }
   return held;
-}
-
-/// A fix that pulls edges of a flat boundary in the plane of the wall, and lets them turn about its normal: the
-/// elements with rotations about the normal put moments on edges, which nothing takes there, so that a uniform tension
-/// comes out uneven. Of curved walls these moments are small beside the bending at a held end.
-bool pulls_without_drilling(const Model& model, const Fix& fix) {
-  if (model.is_solid(fix.body) || !prescribes(fix) || model.shells[fix.body].membrane == Membrane::cst) {
-    return false;
-  }
-  const ShellMesh& mesh = model.shells[fix.body].mesh;
-  std::vector<char> held(mesh.vertices.size(), 0);
-  for (const Index node : fix.nodes) {
-    held[node] = 1;
-  }
-  const TriangleMesh facets = flat_facets(mesh);
-  double pulled = 0, whole = 0;
-  for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
-    const auto& v = facets.triangles[t];
-    const Vec3 &a = facets.vertices[v[k]], &b = facets.vertices[v[(k + 1) % 3]], &c = facets.vertices[v[(k + 2) % 3]];
-    if (held[v[k]] == 0 || held[v[(k + 1) % 3]] == 0) {
-      continue;
-    }
-    const Vec3 normal = (b - a).cross(c - a).normalized();
-    Eigen::Index axis = 0;
-    normal.cwiseAbs().maxCoeff(&axis);
-    const Vec3 outward = (b - a).cross(normal).normalized();
-    const bool in_plane = std::abs(fix.displacement.dot(outward)) > most_of_it * fix.displacement.norm();
-    whole += (b - a).norm();
-    pulled += in_plane && !fix.rotation[static_cast<std::size_t>(axis)] ? (b - a).norm() : 0;
-  }
-  return pulled > most_of_it * whole;
 }
 
 bool cannot_move(const Model& model, std::size_t body, const std::vector<std::array<bool, 6>>& held) {
@@ -510,14 +491,6 @@ void doubt_loads(const Model& model, const RunSettings& settings,
                            zero_when(settings, "so it moves nothing")});
     }
     doubt_steps(named(fix.said_at, model.name_of(fix.body)), "displacement", fix.ramp, settings, found);
-    if (pulls_without_drilling(model, fix)) {
-      found.push_back(
-          {Weight::minor, "free to drill",
-           named(fix.said_at, model.name_of(fix.body)) +
-               ": these ends are pulled, and may turn about the wall's normal: the stress there may be up to 15 % too "
-               "high, and a thin flat wall may seem to buckle: hold that rotation, too (rotation = \"xyz\", or the "
-               "axis of the normal), or take membrane = \"cst\""});
-    }
   }
 }
 
@@ -560,7 +533,7 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     doubt_material(named(body.said_at, body.name), body.material, is_pressed(model, b), found);
     doubt_voxels(body, found);
     if (!has_estimates) {
-      doubt_coarseness(body, found);
+      doubt_coarseness(body, std::holds_alternative<FrequencyRun>(settings.kind), found);
     }
     held.push_back(held_freedoms(model, b));
     if (cannot_move(model, b, held.back())) {

@@ -273,7 +273,7 @@ double ElementFieldEvaluator::Implementation::thickness_at(std::size_t t, int co
 
 bool ElementFieldEvaluator::Implementation::is_held(const Vec3& place) const {
   return std::ranges::any_of(model.fixes, [&](const Fix& fix) {
-    return !model.is_solid(fix.body) && std::ranges::any_of(fix.nodes, [&](Index node) {
+    return !model.is_solid(fix.body) && !plane_of_symmetry(fix) && std::ranges::any_of(fix.nodes, [&](Index node) {
       return model.shells[fix.body].mesh.vertices[node] == place;
     });
   });

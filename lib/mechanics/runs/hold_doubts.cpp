@@ -4,6 +4,8 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/runs/detail/places.hpp"
+#include "tunica/mechanics/runs/detail/shell_system.hpp"
+#include "tunica/mechanics/runs/detail/supports.hpp"
 #include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 #include "tunica/mechanics/runs/meeting_walls.hpp"
@@ -20,6 +22,7 @@
 #include <iterator>
 #include <map>
 #include <numbers>
+#include <set>
 
 namespace tunica {
 namespace {
@@ -381,6 +384,37 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
                        pieces.size() > 1 ? fmt::format(", the piece at {},", where(swing.centre)) : "",
                        1e2 * std::min(swing.rigid / swing.largest, 1.0), swing.largest,
                        swing.turn * 180 / std::numbers::pi, remedy_of_swings(model, b))});
+    }
+  }
+  return found;
+}
+
+std::vector<Warning> doubts_of_loose_bodies(const Model& model, const RunSettings& settings) {
+  std::vector<Warning> found;
+  if (!std::holds_alternative<StaticRun>(settings.kind) || model.contacts.empty()) {
+    return found;
+  }
+  require_valid(model);
+  const ShellSystem system = make_system(model);
+  std::set<std::size_t> said;
+  for (const Piece& piece : system.pieces) {
+    bool touches = false, sticks = false;
+    for (const Contact& contact : model.contacts) {
+      const bool names = std::ranges::any_of(
+          contact.between, [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; });
+      touches = touches || names;
+      sticks = sticks || (names && contact.friction > 0);
+    }
+    const bool attached = std::ranges::any_of(
+        model.attachments, [&](const Attachment& tie) { return tie.body == piece.body || tie.to == piece.body; });
+    const int motions = touches && !sticks && !attached ? free_rigid_motions(system, piece) : 0;
+    if (motions > 0 && said.insert(piece.body).second) {
+      found.push_back(
+          {Weight::note, "held by contact",
+           fmt::format("{}: {} of its 6 rigid motions are held by contact without friction alone: where it is round or "
+                       "flat it may spin or slide, and displacements count that: hold what should not (a [[fix]] of "
+                       "single components)",
+                       label_of(model, piece.body), motions)});
     }
   }
   return found;

@@ -21,6 +21,10 @@ std::vector<Warning> doubts_of_ends(const Model& model);
 /// its largest displacement, and more than half of its wall's thickness, and nothing prescribes it. Cost: linear.
 std::vector<Warning> swings_of(const Model& model, const State& state);
 
+/// Bodies of a static run of which contact without friction alone holds some rigid motion: round or flat, they may spin
+/// or slide, and displacements count that. Notes. Cost: making the system ready, where there is contact.
+std::vector<Warning> doubts_of_loose_bodies(const Model& model, const RunSettings& settings);
+
 /// A static run under suction above a fifth of the load at which the perfect shell buckles by the linear theory: real
 /// shells, never perfect, yield at a part of it (a sphere with a dimple one wall deep at .36). Nothing where shells are
 /// not alone. Cost: a linear buckling analysis, where there is suction at all.

@@ -231,8 +231,12 @@ ShellSystem make_system(const Model& model) {
       const std::array<Vec3, 3> corners{body.mesh.vertices[v[0]], body.mesh.vertices[v[1]], body.mesh.vertices[v[2]]};
       const Vec3 facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
       const double thickness = mean_thickness(body, v);
+      // The patch of a flat part is its facet, whatever is said of normals.
+      constexpr double unlike = 1e-12;
+      const bool flat_around =
+          std::ranges::all_of(v, [&](Index node) { return (at_vertices[node] - facet).squaredNorm() < unlike; });
       ShellSurface surface;
-      surface.curved = curved && body.membrane == Membrane::adapt;
+      surface.curved = (curved || flat_around) && body.membrane == Membrane::adapt;
       std::array<Vec3, 3> bulge;  // the normals that tell how far the shell bulges over an edge
       for (std::size_t k = 0; k < 3; ++k) {
         surface.normals[k] = curved ? body.mesh.normal(t, k) : facet;
@@ -279,6 +283,7 @@ ShellSystem make_system(const Model& model) {
       system.mass[node] += density * e.volume / 4;
     }
   }
+  keep_held_edges(system);
   make_terms(system);
   add_stiffness_norms(system);
 

@@ -5,6 +5,7 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/places.hpp"
 #include "tunica/shell/distance/shell_crossings.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/self_intersections.hpp"
 
 #include <fmt/format.h>
@@ -19,34 +20,35 @@
 namespace tunica {
 namespace {
 
-/// All shells as one mesh, displaced by a state; where there is none, as they are.
-/// @return empty corner normals where some body has none
-ShellMesh joined_shells(const Model& model, const State* state) {
+/// The surfaces of all bodies as one mesh, with the model's nodes, displaced by a state; where there is none, as they
+/// are.
+/// @return empty corner normals where some shell has none
+ShellMesh joined_surfaces(const Model& model, const std::vector<SurfaceFace>& faces, const State* state) {
   ShellMesh all;
-  const bool curved = std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.curved; });
-  for (std::size_t b = 0; b < model.shells.size(); ++b) {
-    const ShellMesh& mesh = model.shells[b].mesh;
-    const std::size_t first = model.first_node(b);
-    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-      all.vertices.push_back(mesh.vertices[i] +
-                             (state == nullptr ? Vec3(Vec3::Zero()) : state->displacement[first + i]));
+  const bool curved =
+      !model.shells.empty() && std::ranges::all_of(model.shells, [](const ShellBody& body) { return body.curved; });
+  for (std::size_t b = 0; b < model.body_count(); ++b) {
+    const std::vector<Vec3>& vertices = model.vertices_of(b);
+    all.vertices.insert(all.vertices.end(), vertices.begin(), vertices.end());
+  }
+  for (std::size_t i = 0; state != nullptr && i < all.vertices.size(); ++i) {
+    all.vertices[i] += state->displacement[i];
+  }
+  for (const SurfaceFace& face : faces) {
+    all.triangles.push_back(face.nodes);
+    if (!curved) {
+      continue;
     }
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-      std::array<Index, 3> corners{};
-      std::array<Vec3, 3> normals;
+    std::array<Vec3, 3> normals = face.normals;
+    if (!face.curved) {
+      const auto& [a, b, c] = face.nodes;
+      normals.fill((all.vertices[b] - all.vertices[a]).cross(all.vertices[c] - all.vertices[a]).normalized());
+    } else if (state != nullptr) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const Index node = mesh.triangles[t][k];
-        corners[k] = narrow<Index>(first + node);
-        normals[k] = curved ? mesh.normal(t, k) : Vec3(Vec3::Zero());
-        if (curved && state != nullptr) {
-          normals[k] = exponential(state->rotation[first + node]) * normals[k];
-        }
-      }
-      all.triangles.push_back(corners);
-      if (curved) {
-        all.corner_normals.push_back(normals);
+        normals[k] = exponential(state->rotation[face.nodes[k]]) * normals[k];
       }
     }
+    all.corner_normals.push_back(normals);
   }
   return all;
 }
@@ -62,15 +64,6 @@ std::vector<std::array<Index, 2>> crossings_of(const ShellMesh& shells) {
   std::vector<std::array<Index, 2>> crossings = find_self_intersections(flat_facets(shells));
   std::erase_if(crossings, [&](const auto& pair) { return share_a_node(shells, pair); });
   return crossings;
-}
-
-/// Of each node of the shells.
-std::vector<std::size_t> bodies_of(const Model& model) {
-  std::vector<std::size_t> bodies;
-  for (std::size_t b = 0; b < model.shells.size(); ++b) {
-    bodies.insert(bodies.end(), model.shells[b].mesh.vertices.size(), b);
-  }
-  return bodies;
 }
 
 bool are_tied(const Model& model, std::size_t a, std::size_t b) {
@@ -103,6 +96,10 @@ Foot foot_on(const Corners& triangle, const Vec3& p) {
   const double first = arm.cross(v).dot(normal) / squared;
   const double second = u.cross(arm).dot(normal) / squared;
   return {arm.dot(normal) / std::sqrt(squared), first >= 0 && second >= 0 && first + second <= 1};
+}
+
+double distance_of(const Vec3& p, const Corners& triangle) {
+  return (closest_point_on_triangle(p, triangle[0], triangle[1], triangle[2]) - p).norm();
 }
 
 /// The nodes that overlap with a wall in the end, and those that have passed through one on their straight ways.
@@ -169,11 +166,13 @@ bool has_changed_sides(const Corners& from, const Corners& to, const Vec3& p_fro
   return before * after < 0 && std::min(std::abs(before), std::abs(after)) > clear;
 }
 
-/// @param half_wall  mm, of each node
+/// @param tied  of two faces, by their numbers
+/// @param reference  where walls that overlap were farther apart: at a crease they are near from the beginning
 template <typename AreTied>
-Meetings meetings(const std::vector<std::array<Index, 3>>& triangles, const std::vector<double>& half_wall,
-                  const std::vector<Vec3>& from, const std::vector<Vec3>& to, const AreTied& tied) {
-  constexpr double overlap = 0.5;  // of the wall
+Meetings meetings(const std::vector<SurfaceFace>& faces, const std::vector<std::array<Index, 3>>& triangles,
+                  const std::vector<Vec3>& reference, const std::vector<Vec3>& from, const std::vector<Vec3>& to,
+                  const AreTied& tied) {
+  constexpr double overlap = 0.5, nearer_by = 0.25;  // of the wall
   const Ways ways(from, to, triangles);
   Meetings found;
   std::vector<Vec3> before = from;
@@ -184,18 +183,20 @@ Meetings meetings(const std::vector<std::array<Index, 3>>& triangles, const std:
       lower[t].setConstant(infinity);
       upper[t].setConstant(-infinity);
       for (const Index node : triangles[t]) {
-        const Vec3 reach = Vec3::Constant(overlap * half_wall[node]);
+        const Vec3 reach = Vec3::Constant(overlap * faces[t].half_thickness);
         lower[t] = lower[t].cwiseMin(before[node].cwiseMin(after[node]) - reach);
         upper[t] = upper[t].cwiseMax(before[node].cwiseMax(after[node]) + reach);
       }
     }
-    const auto look = [&](const std::array<Index, 3>& one, const std::array<Index, 3>& other) {
+    const auto look = [&](std::size_t of, std::size_t beside) {
+      const auto& other = triangles[beside];
       const Corners now = corners_of(other, after);
       const Corners then = corners_of(other, before);
-      for (const Index node : one) {
-        const double wall = half_wall[node] + half_wall[other[0]];
+      const double wall = faces[of].half_thickness + faces[beside].half_thickness;
+      for (const Index node : triangles[of]) {
         const Foot foot = foot_on(now, after[node]);
-        if (part == ways.parts() && foot.is_inside && std::abs(foot.height) < overlap * wall) {
+        if (part == ways.parts() && foot.is_inside && std::abs(foot.height) < overlap * wall &&
+            distance_of(reference[node], corners_of(other, reference)) > std::abs(foot.height) + nearer_by * wall) {
           found.overlapping.push_back(node);
         }
         if (goes_through(then, now, before[node], after[node]) &&
@@ -207,9 +208,9 @@ Meetings meetings(const std::vector<std::array<Index, 3>>& triangles, const std:
     for (const auto& [i, j] : overlapping_boxes(lower, upper)) {
       const auto& [one, other] = std::tie(triangles[i], triangles[j]);
       const bool share = std::ranges::find_first_of(one, other) != one.end();
-      if (!share && !tied(one[0], other[0])) {
-        look(one, other);
-        look(other, one);
+      if (!share && !tied(i, j)) {
+        look(i, j);
+        look(j, i);
       }
     }
     before = after;
@@ -226,12 +227,11 @@ Meetings meetings(const std::vector<std::array<Index, 3>>& triangles, const std:
 std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
   require_valid(model);
   std::vector<Warning> found;
-  const ShellMesh all = joined_shells(model, nullptr);
-  const std::vector<std::size_t> bodies_of_nodes = bodies_of(model);
-  const auto body_of = [&](Index triangle) { return bodies_of_nodes[all.triangles[triangle][0]]; };
+  const std::vector<SurfaceFace> faces = surface_faces(model).faces;
+  const ShellMesh all = joined_surfaces(model, faces, nullptr);
   std::map<std::array<std::size_t, 2>, std::pair<std::size_t, Vec3>> pairs;  // of bodies: how many shells, and where
   for (const auto& [one, other] : crossings_of(all)) {
-    const auto [a, b] = std::minmax({body_of(one), body_of(other)});
+    const auto [a, b] = std::minmax({faces[one].body, faces[other].body});
     if (!are_tied(model, a, b)) {
       ++pairs.try_emplace({a, b}, 0, all.vertices[all.triangles[one][0]]).first->second.first;
     }
@@ -243,83 +243,79 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
            fmt::format(
                "{}: passes through itself in {} pairs of shells, the first at {}: the numbers of the wall around "
                "there mean nothing: mend the surface, or take more shells",
-               named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), what.first, where(what.second))});
+               label_of(model, bodies[0]), what.first, where(what.second))});
       continue;
     }
     found.push_back(
         {Weight::major, "walls through each other",
          fmt::format("{} and {} pass through each other in {} pairs of shells, the first at {}, and nothing "
                      "holds them apart: move them apart and add a [[contact]] between them",
-                     named(model.shells[bodies[0]].said_at, model.shells[bodies[0]].name), model.shells[bodies[1]].name,
-                     what.first, where(what.second))});
+                     label_of(model, bodies[0]), model.name_of(bodies[1]), what.first, where(what.second))});
   }
   return found;
 }
 
-CrossingWatch::CrossingWatch(const Model& model) : model_(model), body_(bodies_of(model)) {
+CrossingWatch::CrossingWatch(const Model& model) : model_(model) {
   require_valid(model);
-  for (const ShellBody& body : model.shells) {
-    for (std::size_t i = 0; i < body.mesh.vertices.size(); ++i) {
-      half_wall_.push_back(body.thickness[body.thickness.size() == 1 ? 0 : i] / 2);
-      last_.push_back(body.mesh.vertices[i]);
-    }
-  }
+  faces_ = surface_faces(model).faces;
+  last_ = joined_surfaces(model, faces_, nullptr).vertices;
 }
 
 void CrossingWatch::see(const State& state) {
   require_valid(model_, state);
-  if (found_ || model_.shells.empty()) {
+  if (found_) {
     return;
   }
-  const ShellMesh now = joined_shells(model_, &state);
+  const ShellMesh now = joined_surfaces(model_, faces_, &state);
   const std::vector<Vec3> last = std::exchange(last_, now.vertices);
-  const auto tell = [&](const char* kind, const std::string& what, const Vec3& place) {
+  const auto tell = [&](const char* kind, std::size_t body, const std::string& what, const Vec3& place) {
     const std::string when = state.velocity.empty() ? fmt::format("at load factor {:.3g}", state.load_factor)
                                                     : fmt::format("at {:.3g} s", state.time);
     found_ = {Weight::major, kind,
               fmt::format("{}: {} {}, the first at {}: the numbers from there on mean nothing: add a [[contact]] "
                           "between what meets, the same body twice where it is itself, or lower the load",
-                          named(model_.shells.front().said_at, model_.shells.front().name), when, what, where(place))};
+                          label_of(model_, body), when, what, where(place))};
   };
   // What is tied meets in a seam, where the chords of the one go through the other.
-  const auto tied = [&](Index a, Index b) { return body_[a] != body_[b] && are_tied(model_, body_[a], body_[b]); };
+  const auto tied = [&](std::size_t a, std::size_t b) {
+    return faces_[a].body != faces_[b].body && are_tied(model_, faces_[a].body, faces_[b].body);
+  };
   std::vector<std::array<Index, 2>> crossings = crossings_of(now);
-  std::erase_if(crossings,
-                [&](const auto& pair) { return tied(now.triangles[pair[0]][0], now.triangles[pair[1]][0]); });
+  std::erase_if(crossings, [&](const auto& pair) { return tied(pair[0], pair[1]); });
   if (!crossings.empty()) {
     if (!before_) {
-      before_ = crossings_of(joined_shells(model_, nullptr));
+      before_ = crossings_of(joined_surfaces(model_, faces_, nullptr));
     }
     std::vector<std::array<Index, 2>> made;
     std::ranges::set_difference(crossings, *before_, std::back_inserter(made));
     if (!made.empty()) {
       const Corners corners = corners_of(now.triangles[made.front()[0]], now.vertices);
-      tell("walls through each other",
-           fmt::format("the wall passes through itself or another in {} pairs of shells{}", made.size(),
+      tell("walls through each other", faces_[made.front()[0]].body,
+           fmt::format("the wall passes through itself or another in {} pairs of faces{}", made.size(),
                        before_->empty() ? "" : " more than without load"),
            (corners[0] + corners[1] + corners[2]) / 3);
       return;
     }
   }
-  Meetings met = meetings(now.triangles, half_wall_, last, now.vertices, tied);
+  const auto body_of = [&](Index node) {
+    std::size_t body = 0;
+    while (node >= model_.first_node(body + 1)) {
+      ++body;
+    }
+    return body;
+  };
+  const std::vector<Vec3> reference = joined_surfaces(model_, faces_, nullptr).vertices;
+  const Meetings met = meetings(faces_, now.triangles, reference, last, now.vertices, tied);
   if (!met.passed.empty()) {
-    tell("walls through each other",
+    tell("walls through each other", body_of(met.passed.front()),
          fmt::format("the wall has passed through itself or another at {} nodes since the state before",
                      met.passed.size()),
          now.vertices[met.passed.front()]);
-    return;
-  }
-  if (!met.overlapping.empty()) {
-    const std::vector<Vec3> reference = joined_shells(model_, nullptr).vertices;
-    std::vector<Index> made;
-    std::ranges::set_difference(met.overlapping,
-                                meetings(now.triangles, half_wall_, reference, reference, tied).overlapping,
-                                std::back_inserter(made));
-    if (!made.empty()) {
-      tell("walls overlap",
-           fmt::format("the wall overlaps with itself or another by more than half of it at {} nodes", made.size()),
-           now.vertices[made.front()]);
-    }
+  } else if (!met.overlapping.empty()) {
+    tell("walls overlap", body_of(met.overlapping.front()),
+         fmt::format("the wall overlaps with itself or another by more than half of it at {} nodes",
+                     met.overlapping.size()),
+         now.vertices[met.overlapping.front()]);
   }
 }
 

@@ -10,6 +10,12 @@ std::string named(const std::string& said_at, const std::string& name) {
   return said_at.empty() ? name : said_at + ": " + name;
 }
 
+std::string label_of(const Model& model, std::size_t body) {
+  const std::string& name = model.name_of(body);
+  return named(model.is_solid(body) ? model.solids[body - model.shells.size()].said_at : model.shells[body].said_at,
+               name);
+}
+
 std::string where(const Vec3& p) {
   constexpr double round_off = 1e-9;  // of the largest coordinate
   const double negligible = round_off * p.cwiseAbs().maxCoeff();

@@ -91,10 +91,11 @@ struct Summary {
   /// steps, and the largest motion; root mean squares over the nodes, mm, turns times the body's length.
   double largest_bend = 0;
   double largest_motion = 0;
-  std::vector<Snap> snaps;             ///< under load control, in order
-  std::vector<double> limit_factors;   ///< load factors at which a path by arc length turns, in its order
-  std::vector<double> branch_factors;  ///< and at which other paths leave it
-  bool ends_unstable = false;          ///< the last state is one that a shell under its load alone would leave
+  std::vector<Snap> snaps;                ///< under load control, in order
+  std::vector<double> limit_factors;      ///< load factors at which a path by arc length turns, in its order
+  std::vector<double> branch_factors;     ///< and at which other paths leave it
+  std::optional<double> short_of_factor;  ///< where such a path ends whose steps ran out before its max_factor
+  bool ends_unstable = false;             ///< the last state is one that a shell under its load alone would leave
   /// MPa, of the model's contacts, in order: the largest pressure of any accepted state, also of those within a step.
   std::vector<double> contact_pressures;
 };

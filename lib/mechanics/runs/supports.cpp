@@ -3,6 +3,7 @@
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
+#include "tunica/surface/mesh/incidence.hpp"
 
 #include <fmt/format.h>
 
@@ -215,7 +216,96 @@ void hold_balanced_motions(ShellSystem& system) {
   }
 }
 
+/// Per node, onto what the fixes' components hold. Nodes that slide in planes have none: they do not turn about the
+/// wall's normal, nor about the axis by which their edges would bulge.
+struct HeldDirections {
+  std::vector<Mat3> translations, rotations;
+};
+
+HeldDirections held_directions(const ShellSystem& system) {
+  const Model& model = *system.model;
+  const std::vector<Mat3> none(system.node_count(), Mat3::Zero());
+  HeldDirections onto{none, none};
+  for (const Fix& fix : model.fixes) {
+    for (const Index node : fix.nodes) {
+      const std::size_t global = model.first_node(fix.body) + node;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto k = narrow<Eigen::Index>(c);
+        onto.translations[global](k, k) = fix.translation[c] ? 1 : onto.translations[global](k, k);
+        onto.rotations[global](k, k) = fix.rotation[c] ? 1 : onto.rotations[global](k, k);
+      }
+    }
+  }
+  return onto;
+}
+
+using Edges = std::set<std::pair<Index, Index>>;  // by their ends
+
+/// Of rims that other bodies carry.
+Edges carried_edges(const ShellSystem& system) {
+  const Model& model = *system.model;
+  std::vector<char> is_carried(system.node_count(), 0);
+  for (const Carried& carried : system.carried) {
+    is_carried[carried.node] = 1;
+  }
+  Edges edges;
+  for (std::size_t b = 0; !system.carried.empty() && b < model.shells.size(); ++b) {
+    const TriangleMesh facets = flat_facets(model.shells[b].mesh);
+    const auto first = narrow<Index>(model.first_node(b));
+    for (const auto& [t, k] : boundary_edges(neighbours(facets, incidence(facets)))) {
+      const Index i = facets.triangles[t][k] + first, j = facets.triangles[t][(k + 1) % 3] + first;
+      if (is_carried[i] != 0 && is_carried[j] != 0) {
+        edges.insert(std::minmax(i, j));
+      }
+    }
+  }
+  return edges;
+}
+
+Edges loaded_edges(const Model& model) {
+  Edges edges;
+  for (const Load& load : model.loads) {
+    const auto* of_edges = std::get_if<EdgeLoad>(&load.kind);
+    if (of_edges != nullptr && !model.is_solid(load.body)) {
+      const auto first = narrow<Index>(model.first_node(load.body));
+      for (const auto& [a, b] : of_edges->edges) {
+        edges.insert(std::minmax(a + first, b + first));
+      }
+    }
+  }
+  return edges;
+}
+
 }  // namespace
+
+void keep_held_edges(ShellSystem& system) {
+  constexpr double straight = 1e-9;
+  const HeldDirections held = held_directions(system);
+  const Edges loaded = loaded_edges(*system.model), carried = carried_edges(system);
+  for (ShellElement& element : system.elements) {
+    const Vec3 normal = element.axes.row(2).transpose();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto next = (k + 1) % 3;
+      const Vec3 along = (element.from_centroid.col(next) - element.from_centroid.col(k)).normalized();
+      const Vec3 across = along.cross(normal);
+      double in_plane = 1, out_of_plane = 1, turning = 0;
+      for (const Index node : {element.nodes[k], element.nodes[next]}) {
+        in_plane = std::min(in_plane, across.dot(held.translations[node] * across));
+        out_of_plane = std::min(out_of_plane, normal.dot(held.translations[node] * normal));
+        turning = std::max(turning, 1 - normal.dot(held.rotations[node] * normal));
+      }
+      element.bow.col(k) *= 1 - in_plane * (element.curved ? 1 : turning);
+      element.bending_edges[k] = 1 - in_plane * out_of_plane;
+      const std::pair<Index, Index> edge = std::minmax(element.nodes[k], element.nodes[next]);
+      const bool lies_flat =
+          element.curved && element.slopes.segment<2>(2 * k).norm() + std::abs(element.tilts[k]) < straight;
+      if (carried.contains(edge) || (lies_flat && loaded.contains(edge))) {
+        element.bow.col(k).setZero();
+        element.bending_edges[k] = 0;
+      }
+    }
+  }
+}
 
 void make_supports(ShellSystem& system) {
   const Model& model = *system.model;

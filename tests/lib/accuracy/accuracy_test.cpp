@@ -267,6 +267,43 @@ TEST(Estimates, APercentileThatAgreesByChanceIsNotBelieved) {
   EXPECT_EQ(found["membrane_mean_mpa"].error, mean);
 }
 
+/// Stress at the faces is of first order: a clamped tube of some hundred shells against one of 18,432.
+TEST(Estimates, StressAtTheFacesIsOffByAboutWhatIsSaid) {
+  const auto tube = [](std::size_t around) {
+    Model model;
+    model.shells.push_back(
+        benchmarks::flat_body(benchmarks::tube_mesh(radius, radius, 40, around, around), 1, 0.4, 0.3));
+    model.shells[0].curved = true;
+    model.shells[0].rest = Rest::curved;
+    benchmarks::hold(
+        model, [](const Vec3& p) { return p.z() < 1e-9 || p.z() > 40 - 1e-9; }, "xyz", "xyz");
+    model.loads.push_back({0, PressureLoad{1e-6, true}, {}});
+    return model;
+  };
+  const auto solved = [](const System& system) {
+    State last;
+    (void)solve(system, [&](const State& state) { last = state; });
+    return last;
+  };
+  const System fine(tube(96), at_rest());
+  const double truth = ElementFieldEvaluator(fine)(solved(fine)).wall.stress_p99;
+  for (const std::size_t around : {12, 14, 16, 20, 24}) {
+    const Model model = tube(around);
+    const System system(model, at_rest());
+    const State last = solved(system);
+    const ElementFields fields = ElementFieldEvaluator(system)(last);
+    const Estimates found =
+        estimate_by_refinement(model, last, fields, {nullptr}, at_rest(), [&](std::vector<ShellBody> bodies) {
+          Model finer = model;
+          finer.shells = std::move(bodies);
+          return finer;
+        }).estimates;
+    const double error = std::abs(fields.wall.stress_p99 / truth - 1);
+    EXPECT_LT(error, found.at("stress_p99_mpa").error) << around;
+    EXPECT_LT(found.at("stress_p99_mpa").error, 0.15) << around;
+  }
+}
+
 TEST(Levels, ARigidMotionStaysOne) {
   const ShellBody body = benchmarks::pressurised_sphere(1, thickness, 1).shells.front();
   const std::vector<ShellBody> coarse{body, body};

@@ -91,6 +91,28 @@ double rigid_error(Model model, std::size_t body, const std::function<bool(const
   return error;
 }
 
+/// Attachments hold nothing to the ground: what is joined moves freely as one.
+TEST(Carried, WhatNothingHoldsIsRefusedWithAllThatIsAttached) {
+  Model model = solid_on_shell();
+  model.loads.push_back({0, PressureLoad{1e-3, true}, {}});
+  const auto hold_node = [&](Index node, std::array<bool, 3> translation) {
+    Fix fix;
+    fix.nodes = {node};
+    fix.translation = translation;
+    fix.rotation = {false, false, false};
+    model.fixes.push_back(fix);
+  };
+  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("(6 of its 6"));
+  hold_node(0, {false, true, false});
+  EXPECT_THAT(error_of(model, linear_run()),
+              testing::HasSubstr("can move freely, with all that is attached to it (5 of"));
+  hold_node(4, {true, true, true});
+  hold_node(24, {false, true, true});
+  EXPECT_THAT(error_of(model, linear_run()), testing::HasSubstr("(1 of its 6"));
+  hold_node(20, {false, false, true});
+  EXPECT_EQ(error_of(model, linear_run()), "");
+}
+
 TEST(Carried, AShellOnASolidFollowsItsRigidMotion) {
   EXPECT_LT(rigid_error(
                 shell_on_solid(), 1, [](const Vec3& x) { return x.z() < -1 + eps; }, 0.6),

@@ -3,7 +3,7 @@
 #include "tunica/mechanics/runs/hold_doubts.hpp"
 #include "tunica/mechanics/runs/meeting_walls.hpp"
 
-#include "benchmarks.hpp"
+#include "tets.hpp"
 #include "tunica/mechanics/model/selection.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
 
@@ -222,7 +222,7 @@ TEST(HoldDoubts, WallsThroughEachOtherAreSaidWithThePlace) {
   ASSERT_TRUE(watch.found());
   EXPECT_EQ(watch.found()->kind, "walls through each other");
   EXPECT_THAT(watch.found()->text, HasSubstr("at load factor 0.5"));
-  EXPECT_THAT(watch.found()->text, HasSubstr("pairs of shells, the first at ("));
+  EXPECT_THAT(watch.found()->text, HasSubstr("pairs of faces, the first at ("));
   EXPECT_THAT(watch.found()->text, HasSubstr("[[contact]]"));
   watch.see(at_rest(model));
   EXPECT_TRUE(watch.found());
@@ -274,6 +274,41 @@ TEST(HoldDoubts, WallsThatOverlapByMoreThanHalfAreSaid) {
   }
 }
 
+/// Nodes within half a wall of an edge are near the wall around it from the beginning.
+/// A block between two planes, held at one node, in friction or not.
+TEST(HoldDoubts, WhatContactAloneHoldsIsSaid) {
+  Model model = one_solid(make_block(2, 2, 2, [](const Vec3& p) { return Vec3(10 * p); }), 1, 0.3);
+  Fix fix;
+  fix.nodes = nodes_of(model, 0, [](const Vec3& p) { return p.norm() < eps; });
+  fix.translation = {true, true, true};
+  model.fixes.push_back(fix);
+  model.rigids.push_back({"table", RigidPlane{{{{0, Vec3(0, 0, -1)}}}, Vec3::UnitZ()}, {}, {}});
+  EXPECT_THAT(doubts_of_loose_bodies(model, nonlinear_run({1})), IsEmpty());
+  Contact contact;
+  contact.between = {ContactParty{false, 0}, ContactParty{true, 0}};
+  model.contacts.push_back(contact);
+  const std::vector<Warning> found = doubts_of_loose_bodies(model, nonlinear_run({1}));
+  ASSERT_THAT(kinds(found), ElementsAre("held by contact"));
+  EXPECT_THAT(found[0].text, HasSubstr("3 of its 6 rigid motions"));
+  model.contacts[0].friction = 0.3;
+  EXPECT_THAT(doubts_of_loose_bodies(model, nonlinear_run({1})), IsEmpty());
+}
+
+TEST(HoldDoubts, WallsThatMeetAtACreaseDoNotOverlap) {
+  Model model;
+  model.shells.push_back(flat_body(make_box(25, 20), 1, 0.3, 2));
+  model.loads.push_back({0, PressureLoad{1e-6, true}, {}});
+  model.rigid_motions.push_back({0});
+  CrossingWatch watch(model);
+  State state = at_rest(model);
+  watch.see(state);
+  for (std::size_t i = 0; i < model.node_count(); ++i) {
+    state.displacement[i] = 1e-6 * Vec3(std::sin(3.0 * i), std::sin(5.0 * i), std::sin(7.0 * i));
+  }
+  watch.see(state);
+  EXPECT_FALSE(watch.found());
+}
+
 TEST(HoldDoubts, WallsThatSlideAndTurnTogetherMeetNothing) {
   const NestedTubes tubes;
   CrossingWatch watch(tubes.model);
@@ -281,6 +316,40 @@ TEST(HoldDoubts, WallsThatSlideAndTurnTogetherMeetNothing) {
   watch.see(tubes.moved(1.1, -15, 2.5));
   watch.see(tubes.moved(1, 0, -0.5));
   EXPECT_FALSE(watch.found());
+}
+
+/// A bar along x beside a tube, and a second one beside the first.
+TEST(HoldDoubts, SolidsThatPassThroughOthersAreSaid) {
+  const auto bar_at = [](double y) {
+    return make_block(6, 2, 2, [y](const Vec3& p) { return Vec3(40 * p.x() - 20, y + 3 * p.y(), 19 + 3 * p.z()); });
+  };
+  Model model = tube(10, 40, 1, 0.01);
+  model.solids.push_back({"bar", bar_at(12), {1, 0.3, std::nullopt}, SolidLaw::corotational});
+  model.solids.push_back({"other bar", bar_at(16), {1, 0.3, std::nullopt}, SolidLaw::corotational});
+  EXPECT_THAT(kinds(doubts_of_meeting_walls(model)), IsEmpty());
+  const auto moved = [&](std::size_t body, double by) {
+    State state = at_rest(model);
+    for (std::size_t i = model.first_node(body); i < model.first_node(body + 1); ++i) {
+      state.displacement[i] = Vec3(0, by, 0.5);
+    }
+    return state;
+  };
+  for (const auto& [body, by, by_name] : {std::tuple(1, -3.5, "shell"), {2, -2.0, "bar"}, {2, -40.0, ""}}) {
+    CrossingWatch watch(model);
+    watch.see(at_rest(model));
+    EXPECT_FALSE(watch.found());
+    watch.see(moved(static_cast<std::size_t>(body), by));
+    ASSERT_TRUE(watch.found()) << by;
+    EXPECT_EQ(watch.found()->kind, "walls through each other");
+    EXPECT_THAT(watch.found()->text, testing::StartsWith(by_name));
+  }
+  model.solids[1].mesh = bar_at(14.5);
+  const std::vector<Warning> found = doubts_of_meeting_walls(model);
+  ASSERT_THAT(kinds(found), ElementsAre("walls through each other"));
+  EXPECT_THAT(found[0].text, HasSubstr("bar and other bar"));
+  model.shells.clear();
+  model.loads.clear();
+  EXPECT_THAT(kinds(doubts_of_meeting_walls(model)), ElementsAre("walls through each other"));
 }
 
 TEST(HoldDoubts, WhatCrossesInTheImageIsNotTheRunsDoing) {

@@ -125,6 +125,144 @@ TEST(Slide, SlantingRimsAreOffByOnceToTwiceTheirSlant) {
   EXPECT_TRUE(doubts_of_ends(upright_tube).empty());
 }
 
+/// A flat strip with the normals of its plane, whose ends are pulled apart by their translations.
+struct PulledStrip {
+  static constexpr double length = 100, modulus = 1000, density = 1e-9;
+  double thickness = 0.5, strain = 0.01;
+  Membrane membrane = Membrane::adapt;
+  const char* held_rotations = "";
+
+  [[nodiscard]] Model model() const {
+    Model model;
+    const auto place = [](double u, double v) { return Vec3(length * u, 20 * v, 0); };
+    ShellBody body = flat_body(make_grid(20, 4, place, Diagonals::random).mesh, modulus, 0, thickness);
+    body.mesh.normals.assign(body.mesh.vertices.size(), Vec3::UnitZ());
+    body.curved = true;
+    body.rest = Rest::curved;
+    body.membrane = membrane;
+    body.material.density = density;
+    model.shells.push_back(std::move(body));
+    for (const double end : {0.0, length}) {
+      hold(
+          model, [end](const Vec3& p) { return std::abs(p.x() - end) < eps; }, "xyz", held_rotations);
+    }
+    model.fixes.back().displacement = Vec3(strain * length, 0, 0);
+    return model;
+  }
+  /// Hz, of the first mode, relative to a string's, sqrt(stress / density) / (2 L), and what bending adds.
+  [[nodiscard]] double relative_frequency() const {
+    RunSettings settings;
+    settings.kind = FrequencyRun{1, {false, {1}}};
+    const Summary summary = solve(model(), settings, [](const State&) {});
+    EXPECT_TRUE(summary.snaps.empty());
+    const double wave = pi / (length * (1 + strain));
+    const double of_tension = modulus * strain / density * wave * wave;
+    const double of_bending = modulus * thickness * thickness / 12 / density * std::pow(wave, 4);
+    return summary.frequencies[0] / std::sqrt(of_tension + of_bending) * 2 * pi;
+  }
+};
+
+/// Reactions of translations are in balance with a constant tension, on a grid whose nodes and diagonals are drawn.
+TEST(HeldEdges, AStripThatIsPulledIsStressedEvenlyWhateverHoldsItsRotations) {
+  for (const Membrane membrane : {Membrane::adapt, Membrane::opt, Membrane::cst}) {
+    for (const char* rotations : {"", "z", "xyz"}) {
+      for (const RunSettings& settings : {linear_run(), nonlinear_run({1})}) {
+        const Model model = PulledStrip{.membrane = membrane, .held_rotations = rotations}.model();
+        const ElementFields fields = element_fields(model, last_state(model, settings));
+        const auto [least, most] = std::ranges::minmax(fields.von_mises);
+        constexpr double wanted = PulledStrip::modulus * 0.01;
+        EXPECT_NEAR(least, wanted, 1e-7 * wanted);
+        EXPECT_NEAR(most, wanted, 1e-7 * wanted);
+      }
+    }
+  }
+}
+
+TEST(HeldEdges, AStripInTensionRingsAsAString) {
+  for (const double strain : {1e-5, 1e-3, 1e-2}) {
+    for (const char* rotations : {"", "z"}) {
+      EXPECT_NEAR((PulledStrip{.strain = strain, .held_rotations = rotations}.relative_frequency()), 1, 0.006)
+          << strain;
+    }
+  }
+}
+
+/// By an edge load, in its plane and out of it.
+TEST(HeldEdges, AThinStripThatALoadPullsStaysFlat) {
+  for (const double thickness : {0.5, 0.02}) {
+    for (const bool in_plane : {true, false}) {
+      Model model = PulledStrip{.thickness = thickness}.model();
+      model.fixes.pop_back();
+      const std::vector<Index> end =
+          nodes_where(model.shells[0].mesh, [](const Vec3& p) { return p.x() > PulledStrip::length - eps; });
+      EdgeLoad pull;
+      for (std::size_t i = 0; i + 1 < end.size(); ++i) {
+        pull.edges.push_back({end[i], end[i + 1]});
+      }
+      pull.per_length = Vec3(0.01 * PulledStrip::modulus * thickness, 0, 0);
+      model.loads.push_back({0, pull, {}});
+      hold(
+          model, [&](const Vec3& p) { return in_plane || p.x() > PulledStrip::length - eps; }, "z", "");
+      State last;
+      const Summary summary = solve(model, nonlinear_run({1}), [&](const State& state) { last = state; });
+      EXPECT_TRUE(summary.snaps.empty());
+      const ElementFields fields = element_fields(model, last);
+      const auto [least, most] = std::ranges::minmax(fields.von_mises);
+      EXPECT_NEAR(least, 10, 0.15);  // the load is dead, and the strip gets narrower nowhere
+      EXPECT_NEAR(most, 10, 0.15);
+    }
+  }
+}
+
+/// The load acts on the chords of its rim, the wall on the arcs; where the rim is moved, all is right.
+TEST(HeldEdges, AVeryThinTubeThatALoadPullsSeemsToBuckle) {
+  const auto snaps = [](double thickness, bool loaded) {
+    Model model;
+    ShellBody body = flat_body(tube_mesh(10, 10, 40, 24, 16), 1000, 0.3, thickness);
+    body.curved = true;
+    body.rest = Rest::curved;
+    model.shells.push_back(body);
+    hold(
+        model, [](const Vec3& p) { return p.z() < eps; }, "xyz", "xyz");
+    if (loaded) {
+      EdgeLoad pull;
+      for (std::size_t i = 0; i < 24; ++i) {
+        pull.edges.push_back({static_cast<Index>(16 * 24 + i), static_cast<Index>(16 * 24 + (i + 1) % 24)});
+      }
+      pull.per_length = Vec3(0, 0, 10 * thickness);
+      model.loads.push_back({0, pull, {}});
+    } else {
+      hold(
+          model, [](const Vec3& p) { return p.z() > 40 - eps; }, "xyz", "");
+      model.fixes.back().displacement = Vec3(0, 0, 0.4);
+    }
+    return solve(model, nonlinear_run({1}), [](const State&) {}).snaps.size();
+  };
+  EXPECT_EQ(snaps(0.1, true), 0U);
+  EXPECT_EQ(snaps(0.02, true), 1U);
+  EXPECT_EQ(snaps(0.02, false), 0U);
+}
+
+/// The energy of tension is that of the patches' surface, which moves between the nodes: their mass does not.
+TEST(HeldEdges, AThinStripOfFewShellsRingsTooSlowly) {
+  EXPECT_NEAR((PulledStrip{.thickness = 0.02}.relative_frequency()), 0.64, 0.02);
+  EXPECT_NEAR((PulledStrip{.thickness = 0.02, .membrane = Membrane::cst}.relative_frequency()), 1, 0.006);
+}
+
+/// A bow or a bulge of the edges that are pulled would move them inward: from a strain of 4 (t / h)^2 on it gained.
+TEST(HeldEdges, AThinStripThatIsPulledStaysFlat) {
+  for (const char* rotations : {"", "z", "x", "xyz"}) {
+    const Model model = PulledStrip{.thickness = 0.02, .held_rotations = rotations}.model();
+    State last;
+    const Summary summary = solve(model, nonlinear_run({1}), [&](const State& state) { last = state; });
+    EXPECT_TRUE(summary.converged);
+    EXPECT_TRUE(summary.snaps.empty());
+    for (const Vec3& u : last.displacement) {
+      EXPECT_LT(std::abs(u.z()), 1e-9);
+    }
+  }
+}
+
 TEST(Slide, NodesStayInTheirPlanesInEveryKindOfRun) {
   Model model = sliding_tube(30, 24, 12);
   std::get<PressureLoad>(model.loads[0].kind).value = pressure;

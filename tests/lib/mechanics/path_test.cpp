@@ -47,6 +47,41 @@ Path follow(const Model& model, const ArcLengthRun& run, int axis = 2, double si
   return path;
 }
 
+/// Strips and membranes that stiffen at a ten-thousandth of the first step: a plane ahead meets states of the strip
+/// pressed together, too, which no path leads to.
+TEST(ArcLength, GoesTowardsTheLoadHoweverSoftTheShellBegins) {
+  const auto on = [](double at, double length) {
+    return [at, length](const Vec3& p) { return std::abs(p.x() - at * length) < eps; };
+  };
+  for (const double thickness : {0.05, 0.1, 0.5}) {
+    for (const std::size_t steps : {3, 10, 100}) {
+      const Grid grid = make_grid(20, 4, [](double u, double v) { return Vec3(50 * u, 10 * v, 0); });
+      Model model;
+      model.shells.push_back(flat_body(grid.mesh, 1, 0, thickness));
+      hold(model, on(0, 50), "xyz", "xyz");
+      hold(model, on(1, 50), "xyz", "xyz");
+      model.fixes.back().displacement = Vec3(1, 0, 0);
+      model.loads.push_back({0, AreaLoad{Vec3(0, 0, 1e-7)}, {}});
+      model.probes.push_back({"middle", 0, grid.node(10, 2)});
+      const Path path = follow(model, {200, 1 / static_cast<double>(steps), 1, {}}, 2, 1);
+      EXPECT_GT(*std::min_element(path.factor.begin() + 1, path.factor.end()), 0);
+      EXPECT_NEAR(path.factor.back(), 1, 1e-9);
+      const double at_once = last_state(model, nonlinear_run({1})).displacement[grid.node(10, 2)].z();
+      EXPECT_NEAR(path.deflection.back(), at_once, 1e-3 * at_once) << thickness << ' ' << steps;
+      EXPECT_FALSE(path.summary.short_of_factor);
+    }
+  }
+}
+
+TEST(ArcLength, SaysWhereItsStepsRanOut) {
+  Model roof = hinged_roof(4, 12.7);
+  press(roof);
+  const Path path = follow(roof, {2, 0.01, 1, {}});
+  ASSERT_TRUE(path.summary.short_of_factor);
+  EXPECT_EQ(*path.summary.short_of_factor, path.factor.back());
+  EXPECT_LT(path.factor.back(), 0.5);
+}
+
 /// The load factor at a deflection, by straight lines between the states; of the first pass.
 double factor_at(const Path& path, double deflection) {
   for (std::size_t i = 1; i < path.factor.size(); ++i) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include "benchmarks.hpp"
+#include "tunica/surface/mesh/checks.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 /// Meshes of tetrahedra and models of one solid that the tests share.
 namespace tunica::benchmarks {
@@ -41,6 +43,16 @@ inline TetMesh make_block(std::size_t nx, std::size_t ny, std::size_t nz, const 
       nx, ny, [](double u, double v) { return Vec3(u, v, 0); }, diagonals);
   return extrude(grid.mesh.triangles, grid.mesh.vertices.size(), nz,
                  [&](Index v, double w) { return map(grid.mesh.vertices[v] + Vec3(0, 0, w)); });
+}
+
+/// The surface of a cube of n^3 cells about the origin.
+inline ShellMesh make_box(std::size_t n, double side) {
+  const TetMesh block = make_block(n, n, n, [side](const Vec3& p) { return Vec3(side * (p - Vec3::Constant(0.5))); });
+  TriangleMesh surface = without_unused({block.vertices, boundary_triangles(block)});
+  ShellMesh mesh;
+  mesh.vertices = std::move(surface.vertices);
+  mesh.triangles = std::move(surface.triangles);
+  return mesh;
 }
 
 inline Model one_solid(TetMesh mesh, double young, double poisson, SolidLaw law = SolidLaw::corotational) {

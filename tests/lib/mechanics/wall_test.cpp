@@ -2,6 +2,7 @@
 
 #include "tunica/mechanics/model/wall.hpp"
 #include "benchmarks.hpp"
+#include "tunica/mechanics/runs/disturbed.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 
 #include <gtest/gtest.h>
@@ -96,6 +97,45 @@ TEST(Wall, TheLargestStressIsWhereTheBeamIsClamped) {
   EXPECT_NEAR(wall.stress_p99, 0.99 * largest, 0.025 * largest);
   EXPECT_LT(wall.stress_p99, wall.stress_max);
   EXPECT_EQ(wall.stress_max_at.x(), 0);
+}
+
+/// A tube under pressure on a belt, whole and by its half.
+TEST(Wall, APlaneOfSymmetryIsNoSupport) {
+  const auto wall_of = [](bool half, const char* rotations) {
+    Model model;
+    ShellMesh mesh = tube_mesh(10, 10, half ? 40 : 80, 48, half ? 32 : 64);
+    for (Vec3& x : mesh.vertices) {
+      x.z() -= half ? 0 : 40;
+    }
+    model.shells.push_back(flat_body(mesh, 1, 0.3, 0.5));
+    model.shells[0].curved = true;
+    model.shells[0].rest = Rest::curved;
+    hold(
+        model, [](const Vec3& p) { return std::abs(p.z()) > 40 - eps; }, "xyz", "xyz");
+    if (half) {
+      hold(
+          model, [](const Vec3& p) { return std::abs(p.z()) < eps; }, "z", rotations);
+    }
+    PressureLoad belt{1e-3, true};
+    for (const auto& t : mesh.triangles) {
+      const Vec3 centre = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
+      belt.shares.push_back(std::abs(centre.z()) < 3.75 ? 1 : 0);
+    }
+    model.loads.push_back({0, belt, {}});
+    return element_fields(model, last_state(model, linear_run())).wall;
+  };
+  const Wall whole = wall_of(false, ""), half = wall_of(true, "xy"), supported = wall_of(true, "xyz");
+  EXPECT_NEAR(half.membrane_p99, whole.membrane_p99, 0.01 * whole.membrane_p99);
+  EXPECT_NEAR(half.stress_p99, whole.stress_p99, 0.01 * whole.stress_p99);
+  EXPECT_NEAR(half.left_out, whole.left_out, 0.01);
+  EXPECT_FALSE(half.is_max_on_held);
+  EXPECT_GT(supported.left_out, whole.left_out + 0.05);
+  Fix plane;
+  plane.translation = {false, false, true};
+  plane.rotation = {true, true, false};
+  EXPECT_EQ(plane_of_symmetry(plane), Vec3(0, 0, 1));
+  plane.displacement.z() = 1;
+  EXPECT_FALSE(plane_of_symmetry(plane));
 }
 
 }  // namespace

@@ -6,7 +6,6 @@ namespace tunica {
 
 /// What the meshes of a scene say beside the bodies they hold.
 struct BodyFindings {
-  std::vector<std::string> notes;
   std::vector<Warning> warnings;
   std::optional<std::string> space;  ///< world axes: of the first mesh that says them
   std::filesystem::path space_of;    ///< that mesh

@@ -13,10 +13,11 @@
 namespace tunica::test {
 namespace {
 
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::StartsWith;
+using ::testing::UnorderedElementsAre;
 
 // Lines 1 to 8: a run and the plate, 10 x 10 x 0.1 mm, its middle at z = 0.
 constexpr const char* quasi_static = "[run]\nkind = \"static\"\n";
@@ -166,7 +167,7 @@ TEST_F(BodiesTest, EveryShapeOfARigidBodyArrives) {
       contact("plate", "a") + contact("b", "plate") + contact("plate", "c") + contact("plate", "d") +
       contact("plate", "stent");
   const Scene scene = read(text);
-  EXPECT_TRUE(scene.notes.empty()) << scene.notes.front();
+  EXPECT_THAT(texts_of(scene.warnings), IsEmpty());
   for (const Scene& one : {scene, again(scene)}) {
     ASSERT_EQ(one.rigids.size(), 5U);
     const auto& ball = std::get<RigidSphere>(one.rigids[0].shape);
@@ -205,23 +206,21 @@ TEST_F(BodiesTest, InAStaticRunTablesAreOverTheLoadFactor) {
                                             "centre = [[0.0, [\"0mm\", \"0mm\", \"9mm\"]], [1.0, [\"0mm\", \"0mm\", "
                                             "\"8mm\"]]]\nradius = [[\"0s\", \"1mm\"], [\"1s\", \"3mm\"]]") +
                                       contact("stone", "plate")));
-  ASSERT_EQ(scene.notes.size(), 1U);
-  EXPECT_THAT(scene.notes[0], StartsWith(path().string() + ":13:10: "));
-  EXPECT_THAT(scene.notes[0], HasSubstr("radius is read over the load factor"));
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_THAT(scene.warnings[0].text, StartsWith(path().string() + ":13:10: "));
+  EXPECT_THAT(scene.warnings[0].text, HasSubstr("radius is read over the load factor"));
   EXPECT_EQ(std::get<RigidSphere>(scene.rigids.at(0).shape).centre.at(0.5), Vec3(0, 0, 8.5));
-  EXPECT_TRUE(again(scene).notes.empty());
+  EXPECT_TRUE(again(scene).warnings.empty());
 }
 
-TEST_F(BodiesTest, RigidMeshesAreTurnedOutwardAndIdleBodiesNoted) {
+TEST_F(BodiesTest, RigidMeshesAreTurnedOutwardAndIdleBodiesDoubted) {
   const LoadedScene loaded =
       load(with_plate("[[rigid]]\nname = \"in\"\nmesh = \"inward.ply\"\n" + sphere("idle") + contact("in", "plate")));
   const auto& surface = std::get<RigidMesh>(loaded.model.rigids.at(0).shape).surface;
   EXPECT_GT(signed_volume(surface), 0);
-  EXPECT_THAT(texts_of(loaded.warnings), ElementsAre(HasSubstr("its normals point inward")));
-  EXPECT_THAT(loaded.notes, Contains(HasSubstr("no [[contact]] names \"idle\"")));
-  EXPECT_EQ(std::count_if(loaded.notes.begin(), loaded.notes.end(),
-                          [](const std::string& note) { return note.find("[[contact]]") != std::string::npos; }),
-            1);
+  EXPECT_THAT(texts_of(loaded.warnings),
+              UnorderedElementsAre(HasSubstr("no [[contact]] names \"idle\""), HasSubstr("has no normals"),
+                                   HasSubstr("its normals point inward")));
 }
 
 TEST_F(BodiesTest, ContactsAreResolvedToParties) {
@@ -229,7 +228,7 @@ TEST_F(BodiesTest, ContactsAreResolvedToParties) {
       with_solid(sphere() + contact("stone", "cube", "friction = 0.2\nresolution = \"2.5%\"\nsurface = \"facets\"\n") +
                  contact("plate", "plate", "name = \"folds\"\ntransfer = \"paper\"\n") + contact("plate", "cube")));
   ASSERT_EQ(scene.contacts.size(), 3U);
-  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("not in balance")));
+  EXPECT_THAT(texts_of(scene.warnings), ElementsAre(HasSubstr("not in balance")));
   for (const Scene& one : {scene, again(scene)}) {
     const Model model = load_scene(one).model;
     ASSERT_EQ(model.contacts.size(), 3U);
