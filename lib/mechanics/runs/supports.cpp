@@ -216,27 +216,27 @@ void hold_balanced_motions(ShellSystem& system) {
   }
 }
 
-/// Per node, onto what the fixes' components hold. Nodes that slide in planes have none: they do not turn about the
-/// wall's normal, nor about the axis by which their edges would bulge.
+/// Per node, 1 along the world axes that the fixes' components hold. Nodes that slide in planes have none: they do not
+/// turn about the wall's normal, nor about the axis by which their edges would bulge.
 struct HeldDirections {
-  std::vector<Mat3> translations, rotations;
+  std::vector<Vec3> translations, rotations;
 };
 
 HeldDirections held_directions(const ShellSystem& system) {
   const Model& model = *system.model;
-  const std::vector<Mat3> none(system.node_count(), Mat3::Zero());
-  HeldDirections onto{none, none};
+  const std::vector<Vec3> none(system.node_count(), Vec3::Zero());
+  HeldDirections held{none, none};
   for (const Fix& fix : model.fixes) {
     for (const Index node : fix.nodes) {
       const std::size_t global = model.first_node(fix.body) + node;
       for (std::size_t c = 0; c < 3; ++c) {
         const auto k = narrow<Eigen::Index>(c);
-        onto.translations[global](k, k) = fix.translation[c] ? 1 : onto.translations[global](k, k);
-        onto.rotations[global](k, k) = fix.rotation[c] ? 1 : onto.rotations[global](k, k);
+        held.translations[global][k] = std::max(held.translations[global][k], fix.translation[c] ? 1.0 : 0.0);
+        held.rotations[global][k] = std::max(held.rotations[global][k], fix.rotation[c] ? 1.0 : 0.0);
       }
     }
   }
-  return onto;
+  return held;
 }
 
 using Edges = std::set<std::pair<Index, Index>>;  // by their ends
@@ -290,9 +290,9 @@ void keep_held_edges(ShellSystem& system) {
       const Vec3 across = along.cross(normal);
       double in_plane = 1, out_of_plane = 1, turning = 0;
       for (const Index node : {element.nodes[k], element.nodes[next]}) {
-        in_plane = std::min(in_plane, across.dot(held.translations[node] * across));
-        out_of_plane = std::min(out_of_plane, normal.dot(held.translations[node] * normal));
-        turning = std::max(turning, 1 - normal.dot(held.rotations[node] * normal));
+        in_plane = std::min(in_plane, held.translations[node].dot(across.cwiseAbs2()));
+        out_of_plane = std::min(out_of_plane, held.translations[node].dot(normal.cwiseAbs2()));
+        turning = std::max(turning, 1 - held.rotations[node].dot(normal.cwiseAbs2()));
       }
       element.bow.col(k) *= 1 - in_plane * (element.curved ? 1 : turning);
       element.bending_edges[k] = 1 - in_plane * out_of_plane;
