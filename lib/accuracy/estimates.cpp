@@ -17,7 +17,8 @@ namespace {
 
 constexpr double left_by_second_order = 0.25;  // of the change before
 constexpr double slowest_fall = 1.0 / 3;       // of changes, minus 1: slower is counted as this
-/// What a change to a mesh of half the size leaves of the coarse mesh's error; stresses by bending are of first order.
+/// What a change to a mesh of half the size leaves of the coarse mesh's error. Stresses by bending are of an order
+/// between one and two while their layers are not resolved (`Estimates.StressAtTheFaces*`): the lower counts.
 constexpr double by_second_order = 4.0 / 3, by_first_order = 2;
 constexpr double largest_credible = 0.25;  // a larger change is none of an asymptotic range
 

@@ -25,7 +25,7 @@ double error_of_last(std::span<const double> values);
 Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool doubtful);
 
 /// The error of a static run by one solution on shells split in four and fitted to the targets: a change D leaves 4/3 D
-/// by second order, 2 D of stress and strain at the faces, which are of the first; of a 99th percentile it is the
+/// by second order, 2 D, by the first, of stress and strain at the faces; of a 99th percentile it is the
 /// largest change of what 2, 1 and .5 % of the area pass, for one alone may be small by chance. Credible below a
 /// quarter, but for the largest stress and strain. None, and `reason`, where the finer mesh has no answer.
 /// @param fields  of `state`

@@ -543,8 +543,7 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, 
     warnings.push_back(
         {Weight::minor, "long steps",
          fmt::format("time integration took {:.3g} % of the energy: what swings does so too little, what falls is "
-                     "ahead by about "
-                     "as much; the state of rest is right. For the motion take shorter steps, or {}",
+                     "ahead by about as much; the state of rest is right. For the motion take shorter steps, or {}",
                      1e2 * energy.lost / energy.largest,
                      integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\" in a scene"
                                                               : "a larger spectral_radius")});

@@ -5,6 +5,7 @@
 #include "tunica/shell/patch/shell_mesh.hpp"
 #include "tunica/surface/mesh/tet_mesh.hpp"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -173,6 +174,11 @@ struct Contact {
   /// loses moments. For comparison.
   bool consistent = true;
   std::string said_at{};
+
+  /// Whether it is one of a body that deforms, by its number.
+  [[nodiscard]] bool is_of(std::size_t body) const {
+    return std::ranges::any_of(between, [&](const ContactParty& party) { return !party.rigid && party.index == body; });
+  }
 };
 
 /// A piecewise linear table of factors over time (dynamic) or load factor (static); constant beyond its ends. Empty: 1.

@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 #include <unordered_map>
 
@@ -558,16 +559,13 @@ void check_balance(const ShellSystem& system) {
   }
 }
 
-/// Contact holds what it presses on.
-bool may_be_held_by_contact(const Model& model, const Piece& piece) {
-  return std::ranges::any_of(model.contacts, [&](const Contact& contact) {
-    return std::ranges::any_of(contact.between,
-                               [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; });
-  });
-}
+/// Pieces that attachments join move as one; what is carried there holds nothing by itself, and is left out.
+struct JoinedPieces {
+  Piece whole;                      ///< of the first body
+  std::vector<std::size_t> bodies;  ///< of the pieces
+};
 
-/// Pieces that attachments join move as one; what is carried there holds nothing by itself.
-std::vector<std::vector<Piece>> joined_pieces(const ShellSystem& system) {
+std::vector<JoinedPieces> joined_pieces(const ShellSystem& system) {
   std::vector<std::size_t> piece_of(system.node_count(), 0);
   for (std::size_t p = 0; p < system.pieces.size(); ++p) {
     for (const Index node : system.pieces[p].nodes) {
@@ -582,38 +580,34 @@ std::vector<std::vector<Piece>> joined_pieces(const ShellSystem& system) {
       joined.join(piece_of[carried.node], piece_of[carrier]);
     }
   }
-  std::vector<std::vector<Piece>> groups(system.pieces.size());
+  std::vector<JoinedPieces> groups(system.pieces.size());
   for (std::size_t p = 0; p < system.pieces.size(); ++p) {
-    Piece piece = system.pieces[p];
-    std::erase_if(piece.nodes, [&](Index node) { return is_carried[node] != 0; });
-    if (!piece.nodes.empty()) {
-      groups[joined.root(p)].push_back(std::move(piece));
-    }
+    const Piece& piece = system.pieces[p];
+    JoinedPieces& group = groups[joined.root(p)];
+    group.bodies.push_back(piece.body);
+    std::vector<Index>& nodes = group.whole.nodes;
+    group.whole.body = nodes.empty() ? piece.body : group.whole.body;
+    std::ranges::copy_if(piece.nodes, std::back_inserter(nodes), [&](Index node) { return is_carried[node] == 0; });
   }
-  std::erase_if(groups, [](const auto& group) { return group.empty(); });
+  std::erase_if(groups, [](const JoinedPieces& group) { return group.whole.nodes.empty(); });
   return groups;
 }
 
 /// A static run wants every rigid motion held, or touched by something that may hold it.
 void require_held(const ShellSystem& system) {
   const Model& model = *system.model;
-  for (const std::vector<Piece>& group : joined_pieces(system)) {
-    if (std::ranges::any_of(group, [&](const Piece& piece) { return may_be_held_by_contact(model, piece); })) {
-      continue;
-    }
-    Piece whole;
-    for (const Piece& piece : group) {
-      whole.nodes.insert(whole.nodes.end(), piece.nodes.begin(), piece.nodes.end());
-    }
-    if (const int motions = free_rigid_motions(system, whole); motions > 0) {
+  for (const auto& [whole, bodies] : joined_pieces(system)) {
+    const bool touched = std::ranges::any_of(model.contacts, [&bodies = bodies](const Contact& contact) {
+      return std::ranges::any_of(bodies, [&](std::size_t body) { return contact.is_of(body); });
+    });
+    if (const int motions = touched ? 0 : free_rigid_motions(system, whole); motions > 0) {
       const Index node = whole.nodes.front();
-      const std::size_t body = group.front().body;
       refuse(
-          model, body,
+          model, whole.body,
           fmt::format("the piece with node {} at {} can move freely{} ({} of its 6 rigid motions are not held): add a "
                       "fix, or hold its rigid motions",
-                      node - model.first_node(body), place(system.reference[node]),
-                      group.size() > 1 ? ", with all that is attached to it" : "", motions));
+                      node - model.first_node(whole.body), place(system.reference[node]),
+                      bodies.size() > 1 ? ", with all that is attached to it" : "", motions));
     }
   }
 }

@@ -353,10 +353,7 @@ std::vector<Warning> swings_of(const Model& model, const State& state) {
     const ShellBody& body = model.shells[b];
     const bool pushed =
         std::ranges::any_of(model.fixes, [&](const Fix& fix) { return fix.body == b && prescribes(fix); }) ||
-        std::ranges::any_of(model.contacts, [&](const Contact& contact) {
-          return std::ranges::any_of(contact.between,
-                                     [&](const ContactParty& party) { return !party.rigid && party.index == b; });
-        });
+        std::ranges::any_of(model.contacts, [&](const Contact& contact) { return contact.is_of(b); });
     if (pushed || !is_pressed(pressures_at(model, b)) || is_sheet(body.mesh, lumens_of(body.mesh, {}, {}))) {
       continue;
     }
@@ -398,16 +395,13 @@ std::vector<Warning> doubts_of_loose_bodies(const Model& model, const RunSetting
   const ShellSystem system = make_system(model);
   std::set<std::size_t> said;
   for (const Piece& piece : system.pieces) {
-    bool touches = false, sticks = false;
-    for (const Contact& contact : model.contacts) {
-      const bool names = std::ranges::any_of(
-          contact.between, [&](const ContactParty& party) { return !party.rigid && party.index == piece.body; });
-      touches = touches || names;
-      sticks = sticks || (names && contact.friction > 0);
-    }
+    const auto touches = [&](const Contact& contact) { return contact.is_of(piece.body); };
+    const bool touched = std::ranges::any_of(model.contacts, touches);
+    const bool sticks = std::ranges::any_of(
+        model.contacts, [&](const Contact& contact) { return touches(contact) && contact.friction > 0; });
     const bool attached = std::ranges::any_of(
         model.attachments, [&](const Attachment& tie) { return tie.body == piece.body || tie.to == piece.body; });
-    const int motions = touches && !sticks && !attached ? free_rigid_motions(system, piece) : 0;
+    const int motions = touched && !sticks && !attached ? free_rigid_motions(system, piece) : 0;
     if (motions > 0 && said.insert(piece.body).second) {
       found.push_back(
           {Weight::note, "held by contact",

@@ -51,22 +51,23 @@ Index used_node(const ShellSystem& system, std::size_t body, Index node) {
   return narrow<Index>(global);
 }
 
-/// Half at each end; across the edge it also works on the bow that rotations of its ends make (MembraneStiffness::bow),
-/// by which a membrane under constant stress is in balance with its edge load.
+/// Of the cubic arc over a chord of unit length, by the slopes at its ends.
+double arc_length(double first, double last) { return 1 + (2 * (first * first + last * last) - first * last) / 30; }
+
+/// Half of the arc at each end, and its moment about the chord, as loaded edges keep their shape (keep_held_edges): of
+/// a cubic arc the mean rise over its chord is length^2 / 12 x the difference of its slopes. On flat facets it works on
+/// the bow that rotations of the ends make (MembraneStiffness::bow). So a wall under constant membrane stress is in
+/// balance with its edge load.
 void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& edge_load, DeadLoad& load) {
   struct Side {
-    double share;
+    double share = 0;
     std::vector<std::pair<std::size_t, std::size_t>> elements;  // and which of their edges
   };
   std::map<std::pair<Index, Index>, Side> sides;  // by their ends
   for (std::size_t i = 0; i < edge_load.edges.size(); ++i) {
     const Index a = used_node(system, body, edge_load.edges[i][0]);
     const Index b = used_node(system, body, edge_load.edges[i][1]);
-    const double share = share_of(edge_load.shares, i);
-    const double length = share * (system.reference[a] - system.reference[b]).norm();
-    load.force.segment<3>(first_freedom(a)) += edge_load.per_length * (length / 2);
-    load.force.segment<3>(first_freedom(b)) += edge_load.per_length * (length / 2);
-    sides[std::minmax(a, b)].share = share;
+    sides[std::minmax(a, b)].share += share_of(edge_load.shares, i);
   }
   for (std::size_t e = system.first_element[body]; e < system.first_element[body + 1]; ++e) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -77,18 +78,38 @@ void add_edge_load(const ShellSystem& system, std::size_t body, const EdgeLoad& 
     }
   }
   for (const auto& [ends, side] : sides) {
+    if (side.elements.empty()) {
+      throw InputError(fmt::format("{}: a load acts on an edge from node {} to {}, which no element has",
+                                   system.model->name_of(body), ends.first - system.model->first_node(body),
+                                   ends.second - system.model->first_node(body)));
+    }
     for (const auto& [e, k] : side.elements) {
       const ShellElement& element = system.elements[e];
       const auto corners = reference_corners(element);
-      const Vec3 along = element.axes * (corners[(k + 1) % 3] - corners[k]).normalized();
+      const Index first = element.nodes[k], last = element.nodes[(k + 1) % 3];
+      const Vec3 chord = corners[(k + 1) % 3] - corners[k];
+      const double part = side.share / real(side.elements.size());
+      const double length =
+          chord.norm() * (element.curved ? arc_length(element.slopes[2 * k], element.slopes[2 * k + 1]) : 1);
+      for (const Index node : {first, last}) {
+        load.force.segment<3>(first_freedom(node)) += edge_load.per_length * (part * length / 2);
+      }
+      if (element.curved) {
+        const Vec3 normal = element.axes.transpose() * element.edge_normals.col(k);
+        const double under_arc = chord.squaredNorm() / 12 * (element.slopes[2 * k] - element.slopes[2 * k + 1]);
+        const Mat3 arm = part * under_arc / 2 * normal * edge_load.per_length.transpose();
+        load.director[first] += arm;
+        load.director[last] += arm;
+      }
+      const Vec3 along = element.axes * chord.normalized();
       const Vec2 out(along.y(), -along.x());
       const double pull = (element.axes * edge_load.per_length).head<2>().dot(out);
       const double facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 2;
       const Vec3 force(out.x() * out.x(), out.y() * out.y(), out.x() * out.y());  // the membrane force of a unit pull
-      const Vec3 moment = side.share * facet * pull * element.bow.col(narrow<Eigen::Index>(k)).dot(force) /
-                          real(side.elements.size()) * element.axes.row(2).transpose();
-      load.force.segment<3>(first_freedom(element.nodes[(k + 1) % 3]) + 3) += moment;
-      load.force.segment<3>(first_freedom(element.nodes[k]) + 3) -= moment;
+      const Vec3 moment =
+          part * facet * pull * element.bow.col(narrow<Eigen::Index>(k)).dot(force) * element.axes.row(2).transpose();
+      load.force.segment<3>(first_freedom(last) + 3) += moment;
+      load.force.segment<3>(first_freedom(first) + 3) -= moment;
     }
   }
 }
@@ -153,7 +174,7 @@ void make_loads(ShellSystem& system) {
     if (solid) {
       add_solid_surface_load(system, load, dead);
     }
-    if (std::holds_alternative<AreaLoad>(load.kind) && !solid) {
+    if ((std::holds_alternative<AreaLoad>(load.kind) || std::holds_alternative<EdgeLoad>(load.kind)) && !solid) {
       dead.director.assign(system.node_count(), Mat3::Zero());
     }
     if (pressure != nullptr) {

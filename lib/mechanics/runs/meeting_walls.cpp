@@ -229,7 +229,7 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
   std::vector<Warning> found;
   const std::vector<SurfaceFace> faces = surface_faces(model).faces;
   const ShellMesh all = joined_surfaces(model, faces, nullptr);
-  std::map<std::array<std::size_t, 2>, std::pair<std::size_t, Vec3>> pairs;  // of bodies: how many shells, and where
+  std::map<std::array<std::size_t, 2>, std::pair<std::size_t, Vec3>> pairs;  // of bodies: how many faces, and where
   for (const auto& [one, other] : crossings_of(all)) {
     const auto [a, b] = std::minmax({faces[one].body, faces[other].body});
     if (!are_tied(model, a, b)) {
@@ -241,14 +241,14 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
       found.push_back(
           {Weight::major, "surface crosses itself",
            fmt::format(
-               "{}: passes through itself in {} pairs of shells, the first at {}: the numbers of the wall around "
-               "there mean nothing: mend the surface, or take more shells",
+               "{}: passes through itself in {} pairs of faces, the first at {}: the numbers of the wall around "
+               "there mean nothing: mend the surface, or take a finer mesh",
                label_of(model, bodies[0]), what.first, where(what.second))});
       continue;
     }
     found.push_back(
         {Weight::major, "walls through each other",
-         fmt::format("{} and {} pass through each other in {} pairs of shells, the first at {}, and nothing "
+         fmt::format("{} and {} pass through each other in {} pairs of faces, the first at {}, and nothing "
                      "holds them apart: move them apart and add a [[contact]] between them",
                      label_of(model, bodies[0]), model.name_of(bodies[1]), what.first, where(what.second))});
   }
@@ -258,7 +258,7 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
 CrossingWatch::CrossingWatch(const Model& model) : model_(model) {
   require_valid(model);
   faces_ = surface_faces(model).faces;
-  last_ = joined_surfaces(model, faces_, nullptr).vertices;
+  reference_ = last_ = joined_surfaces(model, faces_, nullptr).vertices;
 }
 
 void CrossingWatch::see(const State& state) {
@@ -304,8 +304,7 @@ void CrossingWatch::see(const State& state) {
     }
     return body;
   };
-  const std::vector<Vec3> reference = joined_surfaces(model_, faces_, nullptr).vertices;
-  const Meetings met = meetings(faces_, now.triangles, reference, last, now.vertices, tied);
+  const Meetings met = meetings(faces_, now.triangles, reference_, last, now.vertices, tied);
   if (!met.passed.empty()) {
     tell("walls through each other", body_of(met.passed.front()),
          fmt::format("the wall has passed through itself or another at {} nodes since the state before",

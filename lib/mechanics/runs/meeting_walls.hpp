@@ -35,7 +35,7 @@ public:
 private:
   const Model& model_;
   std::vector<SurfaceFace> faces_;                           ///< of all bodies
-  std::vector<Vec3> last_;                                   ///< mm, nodes in the state seen before
+  std::vector<Vec3> reference_, last_;                       ///< mm, nodes there and in the state seen before
   std::optional<std::vector<std::array<Index, 2>>> before_;  ///< crossings of the reference, once they are wanted
   std::optional<Warning> found_;
 };

@@ -279,7 +279,6 @@ Edges loaded_edges(const Model& model) {
 }  // namespace
 
 void keep_held_edges(ShellSystem& system) {
-  constexpr double straight = 1e-9;
   const HeldDirections held = held_directions(system);
   const Edges loaded = loaded_edges(*system.model), carried = carried_edges(system);
   for (ShellElement& element : system.elements) {
@@ -297,9 +296,7 @@ void keep_held_edges(ShellSystem& system) {
       element.bow.col(k) *= 1 - in_plane * (element.curved ? 1 : turning);
       element.bending_edges[k] = 1 - in_plane * out_of_plane;
       const std::pair<Index, Index> edge = std::minmax(element.nodes[k], element.nodes[next]);
-      const bool lies_flat =
-          element.curved && element.slopes.segment<2>(2 * k).norm() + std::abs(element.tilts[k]) < straight;
-      if (carried.contains(edge) || (lies_flat && loaded.contains(edge))) {
+      if (carried.contains(edge) || (element.curved && loaded.contains(edge))) {
         element.bow.col(k).setZero();
         element.bending_edges[k] = 0;
       }

@@ -27,6 +27,15 @@ class Paths(SimulateTest):
              "value = [\"0N\", \"0N\", \"-750N\"]\n")
     UNTIL = "control = \"arc-length\"\nuntil = {probe = \"centre\", axis = \"z\", reaches = \"-30mm\"}\n"
 
+    def test_a_path_whose_steps_run_out_says_where(self):
+        short = "control = \"arc-length\"\nmax_steps = 2\nmax_factor = 1.0\nload_steps = 100\n"
+        self.write("scene.toml", self.roof(short, self.FORCE))
+        report = self.run_tool("--scene", "scene.toml", "out.hdf", "--force")
+        ended = report["result"]["probes"]["centre"]["load_factor"][-1]
+        self.assertIn(f"took all of its 2 steps and ended at load factor {ended:.4g}", self.done.stderr)
+        self.assertIn("the path took all", " ".join(report["warnings"]))
+        self.assertLess(ended, .5)
+
     def test_roof_through_its_limit_points(self):
         result = self.simulate(self.roof(self.UNTIL, self.FORCE))
         w = -np.array(result["probes"]["centre"]["displacement_mm"])[:, 2]

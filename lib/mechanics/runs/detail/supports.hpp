@@ -17,10 +17,9 @@ void make_supports(ShellSystem& system);
 /// energy of a wall in tension is that of a surface whose held edges rest: never below zero. Bow and bulge of an edge
 /// with one triangle would move it, and a thin wall in tension would gain by that without bound. Bows of flat facets
 /// stay where the drilling rotations are held: there the bending rotations have a part in them. Where a direction is
-/// held by a part, a part of bow and bulge goes (squares of cosines). Edges under load are as edges that are held where
-/// the shell is flat: the load then acts on their chords alone. Limits: on curved rims it does not go with their bulge,
-/// so that very thin shells that are pulled there seem to buckle. Needs the elements and the carried nodes; to be
-/// called before the terms are made.
+/// held by a part, a part of bow and bulge goes (squares of cosines). Edges of curved elements under an edge load are
+/// as edges that are held: else a thin wall would buckle where it is pulled. Needs the elements and the carried nodes;
+/// to be called before the terms are made.
 void keep_held_edges(ShellSystem& system);
 
 /// Holds as many translations of nodes far apart as a piece has free rigid motions, and stops nothing else: their
