@@ -309,7 +309,7 @@ def misstated():
 
 def rests_as_imaged(setting_of):
     """Whether nothing but the pressure of the image acts, so that equilibrium decides the stress: no stiffness is needed."""
-    imaged, pressure = setting_of("IMAGED_AT"), setting_of("PRESSURE")
+    imaged, pressure = (BLANKS.sub("", setting_of(name)) for name in ("IMAGED_AT", "PRESSURE"))
     return setting_of("KIND") == "static" and not is_zero(imaged) and pressure in ("", imaged)
 
 

@@ -125,7 +125,8 @@ def stage_commands(case, binaries, flags):
              "simulate": [shell, result, "--picture", picture, *refinement]}
     # Whether there is a boundary to hold is known once the surface is.
     is_closed = f"grep -q '\"closed\": *true' {shlex.quote(facts)}"
-    chosen_fix = "" if case.setting("FIX") else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
+    is_held = case.setting("FIX") or re.search(r"--fix\b", case.setting("SIMULATE"))
+    chosen_fix = "" if is_held else f' --fix "$(if {is_closed}; then echo rigid-motions; else echo boundary; fi)"'
     # No megabytes are all there are, as Slurm has it.
     limit = ["--memory-limit", case.setting("MEM") + "MiB"] if case.setting("MEM").strip("0") else []
     commands = {}
@@ -229,6 +230,14 @@ def around(volume):
         return []
 
 
+def left_by(case, stage):
+    """What a stage says it has left in the case's folder: exports, too. Names that make takes apart are not the tools' own."""
+    paths = [str(entry.get("path")) for entry in read_report(os.path.join(case.folder, f"{stage}.json")).get("outputs", [])
+             if isinstance(entry, dict)]
+    return [os.path.basename(path) for path in paths if re.fullmatch(r"[\w.-]+", os.path.basename(path), re.ASCII)
+            and os.path.realpath(os.path.dirname(path)) == os.path.realpath(case.folder)]
+
+
 def is_up_to_date(case, stage, remembered):
     """Whether a stage had these flags and left a good report, whose files, written and read, data beside a header and slices
     of a folder too, are still the same."""
@@ -271,7 +280,7 @@ def plan_case(case, run, binaries, dry):
         write_text(path + ".command", commands[stage])
         write_text(path + ".leaves", " ".join(os.path.join(out, name) for name in PRODUCTS[stage]))
         stale = [os.path.join(out, name) for later in STAGES[number:]
-                 for name in (*PRODUCTS[later], f"{later}.json", f"{later}.log", f".{later}.flags")]
+                 for name in (*PRODUCTS[later], *left_by(case, later), f"{later}.json", f"{later}.log", f".{later}.flags")]
         write_text(path + ".stale", " ".join([*stale, os.path.join(out, REFINED)]))
         done = done and is_up_to_date(case, stage, remembered)
         if done:
@@ -372,7 +381,7 @@ def how_it_ended(case):
             continue
         code = code.strip()
         if code != "0":
-            return stage, code, "" if code else "stopped while it ran"
+            return stage, code, "" if code else "stopped while it ran: the next run begins this stage again"
         last = (stage, code, "stopped before the next stage")
     return last
 

@@ -132,7 +132,13 @@ public:
     for (const AccuracyLevel& level : out_.levels) {
       answers.push_back(level.answers);
     }
-    out_.estimates = estimates_of(answers, error_besides(), is_doubtful_);
+    out_.estimates = estimates_of(
+        answers,
+        [&](const std::string& name) {
+          const auto found = model_errors_.find(name);
+          return error_besides(found == model_errors_.end() ? 0 : found->second);
+        },
+        is_doubtful_);
     out_.settings = settings_;
     out_.system = last_->system;
     out_.summary = std::move(last_->summary);
@@ -221,11 +227,12 @@ private:
   void choose_run() {
     motion_ = std::get<DynamicRun>(settings_.kind);
     try {
-      MotionChoice choice =
-          choose_motion(settings_, model_share * request_.within, at_its_end(model_, motion_->duration).has_value(),
-                        [&](const RunSettings& settings) { return solve_for_answer(settings); });
+      MotionChoice choice = choose_motion(settings_, model_share * request_.within, request_.within,
+                                          at_its_end(model_, motion_->duration).has_value(),
+                                          [&](const RunSettings& settings) { return solve_for_answer(settings); });
       settings_ = choice.settings;
       model_error_ = choice.error;
+      model_errors_ = std::move(choice.errors);
       choices_ = std::move(choice.choices);
     } catch (...) {
       motion_.reset();
@@ -235,7 +242,7 @@ private:
 
   void take(Answer&& answer, double seconds) {
     AccuracyLevel level{level_.shell_count(), answer.value, seconds, {}, answer.summary.newton_iterations};
-    level.answers = answers_of(answer.at, ElementFieldEvaluator(answer.system)(answer.at));
+    level.answers = answer.all;
     for (std::size_t b = 0; b < level_.bodies.size(); ++b) {
       if (targets_[b] != nullptr) {
         level.mean_distance =
@@ -278,32 +285,42 @@ private:
     try {
       Answer anew = solved(settings_);
       other_state_ = std::abs(anew.value / last_->value - 1);
-      out_.levels.back().value = anew.value;
-      last_ = std::move(anew);
+      replace_last(std::move(anew));
     } catch (const RequirementError&) {  // found only from a state near it
     }
+  }
+
+  /// By the same mesh.
+  void replace_last(Answer&& answer) {
+    out_.levels.back().value = answer.value;
+    out_.levels.back().answers = answer.all;
+    last_ = std::move(answer);
   }
 
   void compare_linear() {
     RunSettings linear = settings_;
     std::get<StaticRun>(linear.kind).linear = true;
-    double error = infinity;
+    std::string reason = "no answer";
     try {
       Answer other = solved(linear);
-      error = std::abs(other.value / last_->value - 1);
-      if (error < model_share * request_.within) {
+      const double error = std::abs(other.value / last_->value - 1);
+      const std::map<std::string, double> errors = changes(last_->all, other.all);
+      const auto& [name, most] = largest(errors);
+      if (error < model_share * request_.within && most < request_.within) {
         choices_.push_back({"model", "linear", error, "nonlinear",
                             fmt::format("{:.2g} times the time", last_->seconds / other.seconds)});
         settings_ = linear;
         model_error_ += error;
-        out_.levels.back().value = other.value;
-        last_ = std::move(other);
+        for (const auto& [key, of_answer] : errors) {
+          model_errors_[key] += of_answer;
+        }
+        replace_last(std::move(other));
         return;
       }
+      reason = errors_text(error, name, most);
     } catch (const RequirementError&) {  // no linear answer
     }
-    choices_.push_back({"model", "nonlinear", 0, "linear",
-                        std::isfinite(error) ? fmt::format("an error of {}", percent_text(error)) : "no answer"});
+    choices_.push_back({"model", "nonlinear", 0, "linear", reason});
   }
 
   /// Whether the last level is accepted.
@@ -321,14 +338,14 @@ private:
     for (const AccuracyLevel& level : out_.levels) {
       values.push_back(level.value);
     }
-    out_.estimate = error_of_last(values) + error_besides();
+    out_.estimate = error_of_last(values) + error_besides(model_error_);
     doubt();
     return *out_.estimate < request_.within && out_.reasons.empty();
   }
 
   /// Of the model, the solver, and the borders of what is pressed and held.
-  [[nodiscard]] double error_besides() const {
-    return model_error_ + last_->summary.algebraic_error.value_or(0) + border_error_;
+  [[nodiscard]] double error_besides(double of_model) const {
+    return of_model + last_->summary.algebraic_error.value_or(0) + border_error_;
   }
 
   void doubt() {
@@ -452,7 +469,8 @@ private:
   Accuracy out_;
   std::optional<DynamicRun> motion_;  // that was asked for, once it was decided how it is followed
   std::vector<AccuracyChoice> choices_;
-  double model_error_ = 0;  // of the cheaper models that were chosen
+  double model_error_ = 0;                      // of the cheaper models that were chosen
+  std::map<std::string, double> model_errors_;  // of all answers
   std::optional<Checkpoint> near_;
   bool is_finer_ = false;    // the level, than the coarsest
   bool near_serves_ = true;  // as a start of Newton's method

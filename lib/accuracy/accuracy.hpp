@@ -109,8 +109,9 @@ using ModelOf = std::function<Model(std::vector<ShellBody>)>;
 /// and what second order leaves of the step before; two levels may agree by chance.
 ///
 /// A cheaper model is taken where a coarse level shows that it is off by less than a quarter of the request, and its
-/// error is added: linear instead of nonlinear statics (second level); rest under the final loads instead of a motion,
-/// else the longest step, of those that halve the one given (first level). The solver's error is added too; Newton's
+/// error is added: linear instead of nonlinear statics (second level; no other answer may be off by more than the
+/// request); rest under the final loads instead of a motion, else the longest step, of those that halve the one given
+/// (first level). The solver's error is added too; Newton's
 /// method ends with an increment of a tenth of the request.
 ///
 /// Doubtful are: a small change beside a large one of the displacement field; for stresses, where all of the wall is

@@ -1,5 +1,6 @@
 #include "tunica/accuracy/detail/answer.hpp"
 
+#include "tunica/accuracy/estimates.hpp"
 #include "tunica/core/clock.hpp"
 #include "tunica/core/error.hpp"
 #include "tunica/core/narrow.hpp"
@@ -112,6 +113,7 @@ Answer answer_of(Model model, const RunSettings& settings, const AccuracyRequest
   if ((count - 1) % settings.every != 0) {
     answer.states.push_back(std::move(last));
   }
+  answer.all = answers_of(answer.at, ElementFieldEvaluator(answer.system)(answer.at));
   answer.seconds = seconds_since(start);
   return answer;
 }
@@ -136,12 +138,17 @@ std::optional<Model> at_its_end(const Model& model, double duration) {
   return rest;
 }
 
-MotionChoice choose_motion(const RunSettings& settings, double share, bool may_rest,
+std::string errors_text(double asked, const std::string& name, double most) {
+  return fmt::format("an error of {}, and of {} in {}", percent_text(asked), percent_text(most), name);
+}
+
+MotionChoice choose_motion(const RunSettings& settings, double share, double within, bool may_rest,
                            const std::function<Answer(const RunSettings&)>& solve_for_answer) {
   const auto& given = std::get<DynamicRun>(settings.kind);
   const double left_by_order = given.integrator == Integrator::backward_euler ? 0.5 : 0.25;
   std::vector<RunSettings> runs;
   std::vector<double> values, seconds;
+  std::vector<Answers> all;
   const auto off = [&](double value) { return std::abs(value / values.back() - 1); };
   double left = infinity;
   std::size_t chosen = 0;
@@ -152,6 +159,7 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
     const Answer answer = solve_for_answer(finer);
     runs.push_back(finer);
     values.push_back(answer.value);
+    all.push_back(answer.all);
     seconds.push_back(answer.seconds);
     const std::size_t n = values.size();
     if (n < fewest_runs) {
@@ -168,7 +176,15 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   const auto milliseconds = [&](std::size_t run) {
     return fmt::format("{:.4g} ms", 1e3 * std::get<DynamicRun>(runs[run].kind).step);
   };
-  MotionChoice choice{runs[chosen], error_of(chosen), {}};
+  const std::map<std::string, double> last = changes(all[all.size() - 2], all.back());
+  const auto errors_of = [&](const Answers& answers) {
+    std::map<std::string, double> errors = changes(answers, all.back());
+    for (auto& [name, error] : errors) {
+      error += last.at(name);
+    }
+    return errors;
+  };
+  MotionChoice choice{runs[chosen], error_of(chosen), errors_of(all[chosen]), {}};
   const std::size_t other = chosen > 0 ? chosen - 1 : 1;
   choice.choices.push_back({"step", milliseconds(chosen), choice.error, milliseconds(other),
                             chosen > 0 ? fmt::format("an error of {}", percent_text(error_of(other)))
@@ -181,11 +197,13 @@ MotionChoice choose_motion(const RunSettings& settings, double share, bool may_r
   try {
     const Answer answer = solve_for_answer(rest);
     const double error = off(answer.value) + left;
-    if (error < share) {
+    const std::map<std::string, double> errors = errors_of(answer.all);
+    const auto& [name, most] = largest(errors);
+    if (error < share && most < within) {
       const std::string cost = fmt::format("{:.2g} times the time", seconds[chosen] / answer.seconds);
-      return {rest, error, {{"run", "static", error, "dynamic", cost}}};
+      return {rest, error, errors, {{"run", "static", error, "dynamic", cost}}};
     }
-    choice.choices.push_back({"run", "dynamic", 0, "static", fmt::format("an error of {}", percent_text(error))});
+    choice.choices.push_back({"run", "dynamic", 0, "static", errors_text(error, name, most)});
   } catch (const InputError&) {  // what can move freely has no state of rest
   } catch (const RequirementError&) {
   }

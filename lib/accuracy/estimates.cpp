@@ -79,7 +79,20 @@ double error_of_last(std::span<const double> values) {
   return std::max(to_come, left_by_second_order * change(last - 1));
 }
 
-Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool doubtful) {
+std::map<std::string, double> changes(const Answers& from, const Answers& to) {
+  std::map<std::string, double> found;
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    found[to[i].first] = relative(to[i].second - from[i].second, to[i].second);
+  }
+  return found;
+}
+
+const std::pair<const std::string, double>& largest(const std::map<std::string, double>& changes) {
+  return *std::ranges::max_element(changes, {}, [](const auto& one) { return one.second; });
+}
+
+Estimates estimates_of(const std::vector<Answers>& levels, const std::function<double(const std::string&)>& besides,
+                       bool doubtful) {
   Estimates estimates;
   if (levels.size() < 2) {
     return estimates;
@@ -90,7 +103,7 @@ Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool 
       values.push_back(level[i].second);
     }
     const auto& name = levels.back()[i].first;
-    const double error = error_of_last(values) + (values.back() == 0 ? 0 : besides);
+    const double error = error_of_last(values) + (values.back() == 0 ? 0 : besides(name));
     estimates[name] = {error, !doubtful && levels.size() > 2 && error < largest_credible && !is_at_one_place(name),
                        fmt::format("{} levels", levels.size())};
   }
@@ -115,11 +128,9 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
     (void)solve(
         system, [&](const State& handed) { last = handed; }, {}, near);
     const ElementFields finer_fields = ElementFieldEvaluator(system)(last);
-    const Answers finer = answers_of(last, finer_fields);
-    const Answers coarse = answers_of(state, fields);
-    std::map<std::string, double> errors;
-    for (std::size_t i = 0; i < coarse.size(); ++i) {
-      errors[coarse[i].first] = by_second_order * relative(finer[i].second - coarse[i].second, finer[i].second);
+    std::map<std::string, double> errors = changes(answers_of(state, fields), answers_of(last, finer_fields));
+    for (auto& [name, error] : errors) {
+      error *= by_second_order;
     }
     for (const Percentile& one : percentiles) {
       const std::array<double, 2>&before = fields.wall.beside.*one.beside,

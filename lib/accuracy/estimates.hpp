@@ -3,7 +3,10 @@
 #include "tunica/accuracy/accuracy.hpp"
 #include "tunica/mechanics/runs/fields.hpp"
 
+#include <functional>
+#include <map>
 #include <span>
+#include <string>
 
 /// How far the answers of a run may be off by its mesh.
 namespace tunica {
@@ -20,9 +23,15 @@ Answers answers_of(const State& state, const ElementFields& fields);
 /// refinement studies", 1994. Of two values: the change. Errors: InputError: fewer than two.
 double error_of_last(std::span<const double> values);
 
-/// Of every answer of the last of some levels. @param besides  error of other origin, relative; `doubtful`: by which no
-/// estimate is credible
-Estimates estimates_of(const std::vector<Answers>& levels, double besides, bool doubtful);
+/// Of every answer of the last of some levels. @param besides  error of other origin, relative, by the answer's key;
+/// `doubtful`: by which no estimate is credible
+Estimates estimates_of(const std::vector<Answers>& levels, const std::function<double(const std::string&)>& besides,
+                       bool doubtful);
+
+/// By how much answers change from these to others of the same keys, relative to the others.
+std::map<std::string, double> changes(const Answers& from, const Answers& to);
+/// Which of them changes most.
+const std::pair<const std::string, double>& largest(const std::map<std::string, double>& changes);
 
 /// The error of a static run by one solution on shells split in four and fitted to the targets: a change D leaves 4/3 D
 /// by second order, 2 D, by the first, of stress and strain at the faces; of a 99th percentile it is the

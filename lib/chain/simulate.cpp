@@ -486,11 +486,12 @@ bool may_refine(const SimulateSettings& settings, const LoadedRun& loaded) {
 /// Says how far the answers may be off: by the levels of an accuracy, or by one refinement solved besides.
 void estimate(const System& system, const SimulateSettings& settings, const LoadedRun& loaded, const Recorder& recorded,
               Stages& stage, RunRecord& record, const Context& context) {
+  const std::string subject = subject_of(settings);
   if (record.accuracy) {
     record.estimates = record.accuracy->estimates;
+    warn_of(subject, estimate_warnings(record.estimates, record.accuracy->request.of), context);
     return;
   }
-  const std::string subject = subject_of(settings);
   if (may_refine(settings, loaded) && recorded.drawn) {
     stage("solve");
     RefinedAnswers refined = naming(subject, [&] {
@@ -509,7 +510,7 @@ void estimate(const System& system, const SimulateSettings& settings, const Load
     record.estimates = std::move(refined.estimates);
     stage("write");
   }
-  warn_of(subject, estimate_warnings(record.estimates), context);
+  warn_of(subject, estimate_warnings(record.estimates, {}), context);
 }
 
 void require_accuracy(const Accuracy& accuracy, const SimulateSettings& settings, std::optional<RunJournal>& journal,

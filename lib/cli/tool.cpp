@@ -488,8 +488,9 @@ std::string Tool::stopped_by(int signal) const {
   return fmt::format("stopped by signal {}{}", signal,
                      kept == outputs_.end()
                          ? ""
-                         : fmt::format(": go on by tunica-{} {} {}{}", verb_, resume_flag, part_of(*kept).string(),
-                                       std::filesystem::exists(*kept) ? " --force" : ""));
+                         : fmt::format(": go on by tunica-{} {} {}{}{}", verb_, resume_flag, part_of(*kept).string(),
+                                       std::filesystem::exists(*kept) ? " --force" : "",
+                                       report_.empty() ? "" : fmt::format(" {} {}", report_flag, report_.string())));
 }
 
 // In the thread that watches, while the work goes on: of what that changes only what is guarded is read, so the report

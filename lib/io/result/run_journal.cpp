@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view states_magic = "TUNICA STATES 2\n";
-constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 9\n";
+constexpr std::string_view checkpoint_magic = "TUNICA CHECKPOINT 10\n";
 /// Time between checkpoints, as a multiple of what the last one took.
 constexpr int spacing = 20;
 constexpr std::uint64_t largest_record = std::uint64_t{1} << 40;

@@ -401,10 +401,22 @@ void for_each_notable(const Estimates& estimates, const Tell& tell) {
 
 }  // namespace
 
-std::vector<Warning> estimate_warnings(const Estimates& estimates) {
+std::vector<Warning> estimate_warnings(const Estimates& estimates, const std::optional<Quantity>& asked) {
   std::vector<Warning> warnings;
   for_each_notable(estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
-    warnings.push_back({estimate.error < answer.large ? Weight::minor : Weight::major, "error of the mesh",
+    const Weight weight = estimate.error < answer.large ? Weight::minor : Weight::major;
+    if (asked) {
+      if (answer.of != *asked) {
+        warnings.push_back(
+            {weight, "error of the mesh",
+             fmt::format("{} was not asked for, and may be off by {} by its mesh and model ({}): --of {} "
+                         "(OF={}) asks for it",
+                         answer.name, percent_text(estimate.error), estimate.from, name_of(answer.of),
+                         name_of(answer.of))});
+      }
+      return;
+    }
+    warnings.push_back({weight, "error of the mesh",
                         fmt::format("{} may be off by {} by its mesh ({}): take more shells (SHELLS), or let "
                                     "--accuracy 5% --of {} (ACCURACY=5% OF={}) choose them",
                                     answer.name, percent_text(estimate.error), estimate.from, name_of(answer.of),
@@ -447,14 +459,6 @@ std::vector<std::string> accuracy_notes(const Accuracy& accuracy) {
         "the error of the {} is estimated to be below {:.2g} % of it, from levels that agree ({:.2g} % asked for)",
         name_of(request.of), 100 * *accuracy.estimate, 100 * request.within));
   }
-  for_each_notable(accuracy.estimates, [&](const TellingAnswer& answer, const Estimate& estimate) {
-    if (answer.of != request.of) {
-      lines.push_back(
-          fmt::format("{} was not asked for, and may be off by {} by mesh and model: --of {} (OF={}) asks "
-                      "for it",
-                      answer.name, percent_text(estimate.error), name_of(answer.of), name_of(answer.of)));
-    }
-  });
   for (const AccuracyChoice& choice : accuracy.choices) {
     lines.push_back(
         fmt::format("{}: {}; {} instead: {}", choice.part, choice.chosen, choice.instead, choice.would_cost));
@@ -528,15 +532,17 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
 std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, Integrator integrator) {
   std::vector<Warning> warnings;
   if (energy.gaining_step > 0) {
+    const std::string apart =
+        "let bodies begin farther apart than the resolution of their contact, or take a finer resolution";
     warnings.push_back(
         {Weight::major, "long steps",
-         fmt::format(
-             "time integration gains energy, {} of the largest so far, more than 10 % from step {} ({:.6g} s) "
-             "on: what moves is faster than it should be: {}",
-             percent_text(energy.gained), energy.gaining_step, energy.gaining_time,
-             touches ? "take integrator = \"backward-euler\", which loses energy and never gains it, and let bodies "
-                       "begin farther apart than the resolution of their contact"
-                     : "take shorter steps, or a smaller spectral_radius")});
+         fmt::format("time integration gains energy, {} of the largest so far, more than 10 % from step {} ({:.6g} s) "
+                     "on: what moves is faster than it should be: {}",
+                     percent_text(energy.gained), energy.gaining_step, energy.gaining_time,
+                     !touches ? "take shorter steps, or a smaller spectral_radius"
+                     : integrator == Integrator::backward_euler
+                         ? apart
+                         : "take integrator = \"backward-euler\", or " + apart)});
   }
   constexpr double notable_loss = 0.05;
   if (energy.lost > notable_loss * energy.largest) {

@@ -100,8 +100,8 @@ std::vector<Warning> prestress_warnings(const RunRecord& record);
 /// Where it is hardly that of a living wall.
 std::vector<Warning> unloaded_warnings(const Unloaded& unloaded);
 
-/// What a user should know of those that no accuracy was asked for: the answers that are off by more than is notable.
-std::vector<Warning> estimate_warnings(const Estimates& estimates);
+/// The answers that are off by more than is notable, but for the one that an accuracy was `asked` of.
+std::vector<Warning> estimate_warnings(const Estimates& estimates, const std::optional<Quantity>& asked);
 
 /// A level on a line.
 std::string level_note(const AccuracyLevel& level, const AccuracyRequest& request);

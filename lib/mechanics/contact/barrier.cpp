@@ -13,6 +13,7 @@ constexpr double stiffness_of_pressure =
     Barrier::straight_below / ((1 - Barrier::straight_below) * (1 - Barrier::straight_below));
 constexpr double blunt = 2;               // of what is wanted: above, the barrier is made softer
 constexpr double largest_hardening = 10;  // at a time: pressures of iterates may be far too large
+constexpr double barely_pressed = 0.6;    // of the resolution: a gap there holds a hundredth of what stops a wall
 
 /// The integral of (1 - s)^2 / s from a part of the resolution to 1.
 double energy_from(double s) { return -std::log(s) - 1.5 + 2 * s - s * s / 2; }
@@ -52,14 +53,14 @@ double Barrier::energy(double gap, double resolution) const {
 }
 
 void Barrier::begin() {
-  smallest_gap_ = infinity;
+  smallest_part_ = 1;
   largest_pressure_ = potential_ = 0;
 }
 
-void Barrier::press(double gap, double pressure, double energy, double area) {
-  smallest_gap_ = std::min(smallest_gap_, gap);
+void Barrier::press(double gap, double resolution, double pressure, double area) {
+  smallest_part_ = std::min(smallest_part_, gap / resolution);
   largest_pressure_ = std::max(largest_pressure_, pressure);
-  potential_ += area * energy;
+  potential_ += area * energy(gap, resolution);
 }
 
 bool Barrier::harden() {
@@ -81,15 +82,15 @@ bool Barrier::sharpen() {
 }
 
 void Barrier::brace(double speed) {
-  if (accepted_.potential == 0) {
-    least_ = braking_ * speed * speed;
+  if (accepted_.part > barely_pressed) {
+    least_ = std::max(accepted_.potential > 0 ? least_ : 0, braking_ * speed * speed);
     stiffness_ = std::max(stiffness_, least_);
   }
 }
 
 double Barrier::accept() {
   const double brought = accepted_.potential * (stiffness_ / accepted_.stiffness - 1);
-  accepted_ = {stiffness_, least_, potential_, std::max(accepted_.pressed, largest_pressure_)};
+  accepted_ = {stiffness_, least_, potential_, std::max(accepted_.pressed, largest_pressure_), smallest_part_};
   return brought;
 }
 

@@ -430,7 +430,7 @@ bool ContactSystem::add(const Configuration& configuration, VectorX& external, B
       const Vec3 x = place(group, sample, maps);
       const Press here = press(group, sample, t, x, maps);
       Barrier& barrier = barriers_[group.contact];
-      barrier.press(t.gap, here.law, barrier.energy(t.gap, group.resolution), group.weight * sample.area);
+      barrier.press(t.gap, group.resolution, here.law, group.weight * sample.area);
       if (recorded_ != nullptr) {
         record(group, sample, maps, t, here);
       }

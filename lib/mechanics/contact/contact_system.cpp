@@ -99,6 +99,18 @@ void ContactSystem::make_sides(const Model& model) {
     return material.density.value_or(0);
   };
   std::map<std::size_t, double> walls;  // of the bodies that deform
+  // Mass that a touch has to stop, per area. Of a solid 6 volume / area is the height of a cube or a ball; four times
+  // as much, for an edge that strikes stops what stands beside it, too (Impacts.ABlock*).
+  const auto mass_of = [&](std::size_t body) {
+    double volume = 0, area = 0;
+    for (std::size_t f = surfaces_.first[body]; f < surfaces_.first[body + 1]; ++f) {
+      const auto& [a, b, c] = surfaces_.faces[f].nodes;
+      const Vec3 twice = (reference_[b] - reference_[a]).cross(reference_[c] - reference_[a]);
+      volume += reference_[a].dot(twice) / 6;
+      area += twice.norm() / 2;
+    }
+    return density_of(body) * (model.is_solid(body) ? 24 * volume / area : walls[body]);
+  };
   for (const Contact& contact : contacts_) {
     for (const ContactParty& party : contact.between) {
       if (!party.rigid && walls.emplace(party.index, 0).second) {
@@ -122,7 +134,7 @@ void ContactSystem::make_sides(const Model& model) {
     for (const ContactParty& party : contact.between) {
       young = party.rigid ? young : std::min(young, young_of(party.index));
       wall = party.rigid ? wall : std::min(wall, walls[party.index]);
-      mass = party.rigid ? mass : std::max(mass, density_of(party.index) * walls[party.index]);
+      mass = party.rigid ? mass : std::max(mass, mass_of(party.index));
     }
     barriers_.emplace_back(young, mass, contact.resolution * wall);
     for (std::size_t k = 0; k < (self ? 1 : 2); ++k) {
@@ -679,8 +691,8 @@ void ContactSystem::keep_slip(const Configuration& configuration) {
 std::vector<double> ContactSystem::memory() const {
   std::vector<double> values;
   for (const Barrier& barrier : barriers_) {
-    const auto& [stiffness, least, potential, pressed] = barrier.accepted();
-    values.insert(values.end(), {stiffness, least, potential, pressed});
+    const auto& [stiffness, least, potential, pressed, part] = barrier.accepted();
+    values.insert(values.end(), {stiffness, least, potential, pressed, part});
   }
   values.push_back(real(pairs_.size()));
   for (const auto& [i, j] : pairs_) {
@@ -717,7 +729,8 @@ void ContactSystem::recall(const std::vector<double>& memory, const Configuratio
   };
   for (Barrier& barrier : barriers_) {
     Barrier::Memory accepted;
-    for (double* kept : {&accepted.stiffness, &accepted.least, &accepted.potential, &accepted.pressed}) {
+    for (double* kept :
+         {&accepted.stiffness, &accepted.least, &accepted.potential, &accepted.pressed, &accepted.part}) {
       *kept = next();
     }
     barrier.recall(accepted);

@@ -266,6 +266,32 @@ TEST(HeldEdges, ALoadOnAnEdgeThatNoElementHasIsRefused) {
       ::testing::ThrowsMessage<InputError>(::testing::HasSubstr("an edge from node 96 to 102, which no element has")));
 }
 
+/// The reactions of nodes that may turn act at the nodes, the wall's tension on the arcs between them: the moment of
+/// one about the other bends the rim, by as much as the arcs rise.
+TEST(HeldEdges, ARimThatMayTurnIsBentByItsTensionLessOnFinerMeshes) {
+  const auto off = [](Index n) {
+    Model model;
+    model.shells.push_back(flat_body(tube_mesh(10, 10, 40, n, 2 * n / 3), 1000, 0.3, 0.5));
+    model.shells[0].curved = true;
+    model.shells[0].rest = Rest::curved;
+    const auto foot = [](const Vec3& p) { return p.z() < eps; };
+    hold(model, foot, "z", "");
+    hold(
+        model, [&](const Vec3& p) { return foot(p) && std::abs(p.y()) < eps; }, "y", "");
+    hold(
+        model, [&](const Vec3& p) { return foot(p) && std::abs(p.x()) < eps; }, "x", "");
+    hold(
+        model, [](const Vec3& p) { return p.z() > 40 - eps; }, "z", "");
+    model.fixes.back().displacement = Vec3(0, 0, 0.04);
+    const State state = last_state(model, linear_run());
+    const std::size_t end = n * (2 * n / 3);
+    return (model.shells[0].mesh.vertices[end] + state.displacement[end]).head<2>().norm() / 10 / (1 - 0.3 * 1e-3) - 1;
+  };
+  const double coarse = off(24), fine = off(48);
+  EXPECT_NEAR(coarse / 1e-3, 0.4, 0.02);  // of the strain
+  EXPECT_NEAR(std::log2(coarse / fine), 2, 0.1);
+}
+
 /// Lateral loads on a free rim: the displacement converges from coarse meshes on.
 TEST(HeldEdges, ALoadThatBendsAFreeRimConverges) {
   const auto displacement = [](Index n) {

@@ -258,6 +258,23 @@ class Rules(WithStubs):
             self.assertFalse((self.out / "a" / "1" / name).exists(), name)
         self.assertEqual(self.summary()["a/1"]["stage"], "decimate")
 
+    def test_exports_of_an_earlier_run_go(self):
+        self.make(VOLUMES="a.nii.gz", LABEL=1, **LOAD)
+        folder = self.out / "a" / "1"
+        export, report = folder / "result.glb", folder / "simulate.json"
+        export.write_text("of the load before")
+        said = json.loads(report.read_text())
+        said["outputs"].append({"path": str(export), "sha256": None})
+        report.write_text(json.dumps(said, indent=2))
+        self.assertEqual(self.make(VOLUMES="a.nii.gz", LABEL=1, **{**LOAD, "THICKNESS": "2mm"}).returncode, 0)
+        self.assertFalse(export.exists())
+        self.assertTrue((folder / "result.hdf").exists())
+
+    def test_what_simulate_is_told_to_hold_is_all_that_is_held(self):
+        self.make(VOLUMES="a.nii.gz", LABEL=1, SIMULATE="--fix 'below z=-8mm'", **LOAD)
+        [simulate] = [line for line in self.calls() if line.startswith("simulate")]
+        self.assertEqual(simulate.count("--fix"), 1)
+
     def test_without_k_the_rest_is_not_run_and_the_table_says_so(self):
         done = self.make(VOLUMES="a.nii.gz b.seg.nrrd", LABEL=1, environment={"STUB_FAIL": "extract/a/1"}, **LOAD)
         self.assertNotEqual(done.returncode, 0)
@@ -818,7 +835,7 @@ class Runs(WithStubs):
                 fcntl.flock(file, fcntl.LOCK_EX)  # the last process of the run has ended
             self.assertNotIn("Traceback", stderr)
             self.assertNotIn("done", stdout)
-            self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran", "not run"})
+            self.assertEqual({row["message"] for row in self.summary().values()}, {"stopped while it ran: the next run begins this stage again", "not run"})
             for busy in self.out.rglob("*.busy"):  # of a stub that was stopped
                 busy.rmdir()
             self.calls()

@@ -135,7 +135,7 @@ class Benchmarks(ToolTest):
         momenta, given, record, _ = scenes.impact(self.bench, "ball-plane")
         taken = np.cumsum(record["force_n"], axis=0) * 1e-3
         self.assertGreater(momenta[-1][2], 0)
-        self.assertLess(abs(momenta[20:] - given - taken[20:]).max(), 1e-9 * np.linalg.norm(given))
+        self.assertLess(abs(momenta[20:] - given - taken[20:]).max(), 2e-9 * np.linalg.norm(given))
 
     def test_a_shell_that_bounces_never_passes_the_plane(self):
         momenta, _, record, result = scenes.impact(self.bench, "sphere-plane")

@@ -208,10 +208,11 @@ nearest = ["0mm", "0mm", "10mm"]
         for there in (False, True):
             if there:
                 shutil.copy(self.path("ball.ply"), self.path("out.hdf"))
-            self.assertTrue(self.stop(signal.SIGINT, "ball.ply", "out.hdf", *DYNAMIC, "--force", states=50_000))
+            self.assertTrue(self.stop(signal.SIGINT, "ball.ply", "out.hdf", *DYNAMIC, "--force",
+                                      "--report", "stop.json", states=50_000))
             advised = re.search(r"stopped by signal 2: go on by tunica-simulate (.*)\n", self.said).group(1).split()
-            self.assertEqual(advised, ["--resume", "out.hdf.part", *["--force"] * there])
-            self.run_tool(*advised, says="goes on after step")
+            self.assertEqual(advised, ["--resume", "out.hdf.part", *["--force"] * there, "--report", "stop.json"])
+            self.run_tool(*advised, says="goes on after step", report=False)
             self.assertGreater(os.path.getsize(self.path("out.hdf")), 50_000)
             os.remove(self.path("out.hdf"))
 
