@@ -128,7 +128,8 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
     (void)solve(
         system, [&](const State& handed) { last = handed; }, {}, near);
     const ElementFields finer_fields = ElementFieldEvaluator(system)(last);
-    std::map<std::string, double> errors = changes(answers_of(state, fields), answers_of(last, finer_fields));
+    // Relative to what is shown.
+    std::map<std::string, double> errors = changes(answers_of(last, finer_fields), answers_of(state, fields));
     for (auto& [name, error] : errors) {
       error *= by_second_order;
     }
@@ -137,7 +138,7 @@ RefinedAnswers estimate_by_refinement(const Model& model, const State& state, co
                                &after = finer_fields.wall.beside.*one.beside;
       double change = errors[one.key] / by_second_order;
       for (std::size_t k = 0; k < after.size(); ++k) {
-        change = std::max(change, relative(after[k] - before[k], after[k]));
+        change = std::max(change, relative(after[k] - before[k], before[k]));
       }
       errors[one.key] = one.error_of_change * change;
     }

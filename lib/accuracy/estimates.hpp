@@ -33,7 +33,8 @@ std::map<std::string, double> changes(const Answers& from, const Answers& to);
 /// Which of them changes most.
 const std::pair<const std::string, double>& largest(const std::map<std::string, double>& changes);
 
-/// The error of a static run by one solution on shells split in four and fitted to the targets: a change D leaves 4/3 D
+/// The error of a static run, relative to its answers, by one solution on shells split in four and fitted to the
+/// targets: a change D leaves 4/3 D
 /// by second order, 2 D, by the first, of stress and strain at the faces; of a 99th percentile it is the
 /// largest change of what 2, 1 and .5 % of the area pass, for one alone may be small by chance. Credible below a
 /// quarter, but for the largest stress and strain. None, and `reason`, where the finer mesh has no answer.

@@ -225,7 +225,8 @@ VolumeSelection select_label(const OpenedVolume& opened, const Context& context)
   const ExtractFiles& files = opened.files;
   std::optional<LabelSelection> selection;
   std::string absent;
-  const VolumeFile file =
+  Neighbours neighbours;
+  VolumeFile file =
       read_slabs(files, "extract", context, [&](const VolumeFile& header, const Volume& slab, std::size_t first_slice) {
         if (first_slice == 0) {
           auto [choice, missing] = naming(files.volume.string(), [&] {
@@ -239,8 +240,17 @@ VolumeSelection select_label(const OpenedVolume& opened, const Context& context)
         }
         if (selection) {
           selection->add(slab, first_slice);
+          neighbours.add(slab);
         }
       });
+  if (neighbours.are_grey()) {
+    file.warnings.push_back(
+        {Weight::major, "grey volume",
+         fmt::format("{}: looks like a grey volume or a map of probabilities, not like labels: {:.0f} % of its "
+                     "neighbouring voxels differ; the surface is around the voxels of this one value. For a surface "
+                     "between values pass --isovalue V (ISOVALUE=V)",
+                     files.volume.string(), 100 * real(neighbours.differing) / real(neighbours.pairs))});
+  }
   tell_of(file, context);
   if (selection) {
     absent = selection->absent();

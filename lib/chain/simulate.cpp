@@ -483,12 +483,33 @@ bool may_refine(const SimulateSettings& settings, const LoadedRun& loaded) {
          holds_for_finer_meshes(settings.scene);
 }
 
+/// Whether all that acts is what the wall bears in its image already, so that nothing moves.
+bool only_bears_its_image(const Model& model) {
+  return !model.loads.empty() && std::ranges::none_of(model.fixes, prescribes) && model.contacts.empty() &&
+         std::ranges::all_of(model.loads, [](const Load& load) {
+           const auto* pressure = std::get_if<PressureLoad>(&load.kind);
+           return pressure != nullptr && pressure->imaged_at == pressure->value && !pressure->unload;
+         });
+}
+
+/// What moves by round-off alone is zero, and no part of it an error.
+void take_rest_as_exact(const Model& model, Estimates& estimates) {
+  if (only_bears_its_image(model)) {
+    for (const char* key : {"max_displacement_mm", "strain_p99_percent", "strain_max_percent", "strain_energy_mj"}) {
+      if (const auto found = estimates.find(key); found != estimates.end()) {
+        found->second.error = 0;
+      }
+    }
+  }
+}
+
 /// Says how far the answers may be off: by the levels of an accuracy, or by one refinement solved besides.
 void estimate(const System& system, const SimulateSettings& settings, const LoadedRun& loaded, const Recorder& recorded,
               Stages& stage, RunRecord& record, const Context& context) {
   const std::string subject = subject_of(settings);
   if (record.accuracy) {
     record.estimates = record.accuracy->estimates;
+    take_rest_as_exact(system.model(), record.estimates);
     warn_of(subject, estimate_warnings(record.estimates, record.accuracy->request.of), context);
     return;
   }
@@ -508,6 +529,7 @@ void estimate(const System& system, const SimulateSettings& settings, const Load
                        subject, refined.reason)});
     }
     record.estimates = std::move(refined.estimates);
+    take_rest_as_exact(system.model(), record.estimates);
     stage("write");
   }
   warn_of(subject, estimate_warnings(record.estimates, {}), context);
@@ -585,10 +607,13 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
   warn_of(subject, run_warnings(settings.scene.run, without, last), context);
   constexpr double notable = 0.02;
   if (const double open = open_at_faces(model); open > notable) {
-    context.note(fmt::format(
-        "stress at the faces: thin-shell theory itself is uncertain by about {} here, in the mean over the wall, "
-        "beside any error of the mesh; the membrane stress is not affected",
-        percent_text(open)));
+    warn_of(
+        subject,
+        {{Weight::note, "thin-shell theory",
+          fmt::format("stress at the faces: thin-shell theory itself is uncertain by about {} here, in the mean over "
+                      "the wall, beside any error of the mesh; the membrane stress is not affected",
+                      percent_text(open))}},
+        context);
   }
   warn_of(subject, contact_warnings(record), context);
   if (recorded.crossing()) {

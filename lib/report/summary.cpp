@@ -21,18 +21,19 @@ using Row = std::vector<std::string>;
 
 /// A measure in the tables that end a run.
 struct Shown {
-  const char* key;   ///< the measure's, and the head in the file
-  const char* head;  ///< on the terminal
+  const char* key;                  ///< the measure's, and the head in the file
+  const char* head;                 ///< on the terminal
+  const char* estimates = nullptr;  ///< the answer whose error it is
 };
 // What the answer is and how far it holds; the distance, which is one of shapes, stands apart from it.
 constexpr std::array shown_measures{Shown{"shells", "shells"},
                                     Shown{"distance_percent", "distance %"},
                                     Shown{"membrane_p99_kpa", "membrane kPa"},
-                                    Shown{"membrane_error_percent", "+- %"},
+                                    Shown{"membrane_error_percent", "+- %", "membrane_p99_mpa"},
                                     Shown{"stress_p99_kpa", "faces kPa"},
-                                    Shown{"stress_error_percent", "+- %"},
+                                    Shown{"stress_error_percent", "+- %", "stress_p99_mpa"},
                                     Shown{"max_displacement_mm", "displ. mm"},
-                                    Shown{"displacement_error_percent", "+- %"},
+                                    Shown{"displacement_error_percent", "+- %", "max_displacement_mm"},
                                     Shown{"strain_p99_percent", "strain %"}};
 
 std::string seconds_of(const PipelineCase& one) {
@@ -55,12 +56,17 @@ Row row_of_file(const PipelineCase& one) {
   return row;
 }
 
+bool is_doubtful(const PipelineCase& one, const Shown& shown) {
+  return shown.estimates != nullptr &&
+         one.at("simulate", fmt::format("result.estimates.{}.credible", shown.estimates)) == false;
+}
+
 Row row_of_terminal(const PipelineCase& one) {
   Row row{one.name, one.stage, one.exit};
   for (const Shown& shown : shown_measures) {
     const Measure& what = measure(shown.key);
     const auto value = what.value(one);
-    row.push_back(value ? what.text(*value) : "");
+    row.push_back(!value ? "" : what.text(*value) + (is_doubtful(one, shown) ? "?" : ""));
   }
   const std::size_t warnings = told_warnings(one).size();
   row.push_back(warnings > 0 ? std::to_string(warnings) : "");
@@ -113,7 +119,7 @@ std::string meanings(const std::vector<PipelineCase>& cases) {
         "percentile by area; displ.: the largest, since the image; of a motion all are those at its end\n";
   }
   if (any("membrane_error_percent") || any("stress_error_percent") || any("displacement_error_percent")) {
-    text += "+-: estimated error of the number before it, by number of shells and model\n";
+    text += "+-: estimated error of the number before it, by number of shells and model; ?: not credible\n";
   }
   if (any("distance_percent")) {
     text += "distance: between shells and surface, at most, in % of its diagonal; not the error of stress\n";

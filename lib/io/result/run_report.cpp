@@ -446,8 +446,10 @@ std::string level_note(const AccuracyLevel& level, const AccuracyRequest& reques
 std::string missed_accuracy(const Accuracy& accuracy) {
   return fmt::format("accuracy not reached: {} {} with {} shells, {}, {:.3g} % asked: {}", name_of(accuracy.request.of),
                      value_text(accuracy.request.of, accuracy.levels.back().value), accuracy.levels.back().shells,
-                     accuracy.estimate ? fmt::format("estimated error {}", percent_text(*accuracy.estimate))
-                                       : "without a credible estimate of its error",
+                     accuracy.estimate
+                         ? fmt::format("estimated error {}{}", percent_text(*accuracy.estimate),
+                                       *accuracy.estimate < accuracy.request.within ? " (not credible)" : "")
+                         : "without a credible estimate of its error",
                      100 * accuracy.request.within, fmt::join(accuracy.reasons, "; "));
 }
 
@@ -532,8 +534,6 @@ void add_wall_notes(const Wall& wall, std::vector<Warning>& warnings) {
 std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, Integrator integrator) {
   std::vector<Warning> warnings;
   if (energy.gaining_step > 0) {
-    const std::string apart =
-        "let bodies begin farther apart than the resolution of their contact, or take a finer resolution";
     warnings.push_back(
         {Weight::major, "long steps",
          fmt::format("time integration gains energy, {} of the largest so far, more than 10 % from step {} ({:.6g} s) "
@@ -541,18 +541,19 @@ std::vector<Warning> energy_warnings(const EnergyBalance& energy, bool touches, 
                      percent_text(energy.gained), energy.gaining_step, energy.gaining_time,
                      !touches ? "take shorter steps, or a smaller spectral_radius"
                      : integrator == Integrator::backward_euler
-                         ? apart
-                         : "take integrator = \"backward-euler\", or " + apart)});
+                         ? "let bodies begin farther apart than the resolution of their contact, or take a finer one"
+                         : "take integrator = \"backward-euler\", or adaptive = \"0.01%\"")});
   }
   constexpr double notable_loss = 0.05;
   if (energy.lost > notable_loss * energy.largest) {
     warnings.push_back(
         {Weight::minor, "long steps",
          fmt::format("time integration took {:.3g} % of the energy: what swings does so too little, what falls is "
-                     "ahead by about as much; the state of rest is right. For the motion take shorter steps, or {}",
+                     "ahead by about as much; the state of rest is right. For the motion take shorter steps{}",
                      1e2 * energy.lost / energy.largest,
-                     integrator == Integrator::backward_euler ? "integrator = \"generalised-alpha\" in a scene"
-                                                              : "a larger spectral_radius")});
+                     integrator != Integrator::backward_euler ? ", or a larger spectral_radius"
+                     : touches                                ? ""
+                                                              : ", or integrator = \"generalised-alpha\" in a scene")});
   }
   return warnings;
 }

@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 
 #include <algorithm>
 #include <iterator>
@@ -296,23 +295,17 @@ void warn_of_small_region(const Model& model, std::size_t body, const std::vecto
   }
 }
 
-/// Carried nodes are free to turn: on one line they are a hinge.
+/// Carried nodes are free to turn: those of no whole triangle are a hinge, along a rim as along a straight line.
 void warn_of_hinge(const Model& model, const Attachment& attachment, std::vector<Warning>& warnings) {
-  constexpr double straight = 1e-3;
   if (model.is_solid(attachment.body) || attachment.nodes.size() < 2) {
     return;
   }
-  const std::vector<Vec3>& vertices = model.vertices_of(attachment.body);
-  Eigen::Matrix3Xd places(3, attachment.nodes.size());
-  for (std::size_t i = 0; i < attachment.nodes.size(); ++i) {
-    places.col(narrow<Eigen::Index>(i)) = vertices[attachment.nodes[i]];
-  }
-  places.colwise() -= Vec3(places.rowwise().mean());
-  const Vec3 spread = Eigen::JacobiSVD<Eigen::Matrix3Xd>(places).singularValues();
-  if (spread[1] < straight * spread[0]) {
+  const std::vector<double> whole = whole_triangles(model.shells[attachment.body].mesh.triangles, attachment.nodes);
+  if (std::ranges::all_of(whole, [](double share) { return share == 0; })) {
     warnings.push_back({Weight::major, "hinge",
-                        fmt::format("{}: the nodes that are carried lie on one line, and carried nodes are free to "
-                                    "turn: the joint is a hinge; to clamp it select a strip as wide as a shell or more",
+                        fmt::format("{}: the nodes that are carried lie along a line, and carried nodes are free to "
+                                    "turn: the joint is a hinge, which bears no bending; to clamp it let the bodies "
+                                    "overlap by a shell or more, and attach all of that strip ({{touching}})",
                                     attachment.said_at)});
   }
 }

@@ -16,6 +16,7 @@ namespace tunica {
 namespace {
 
 constexpr double farthest_share = 1;  // of a corner, below zero: as far out as the tetrahedron is high
+constexpr double inside = 1e-9;       // of a tetrahedron, by its smallest coordinate: round-off
 constexpr int search_level = 4;       // pieces per edge of a face, on which the search for the nearest point begins
 
 /// Nearest points of one body's surface in the reference.
@@ -73,6 +74,42 @@ private:
   ClosestPoint tree_;
 };
 
+/// Barycentric coordinates of a point's foot on the plane of a facet, and its height over that.
+std::pair<Vec3, double> over_facet(const std::array<Index, 3>& nodes, const Vec3& p,
+                                   const std::vector<Vec3>& reference) {
+  const Vec3& origin = reference[nodes[0]];
+  Eigen::Matrix<double, 3, 2> sides;
+  sides << reference[nodes[1]] - origin, reference[nodes[2]] - origin;
+  const Vec3 normal = sides.col(0).cross(sides.col(1)).normalized();
+  const Vec2 parts = (sides.transpose() * sides).inverse() * (sides.transpose() * (p - origin));
+  return {Vec3(1 - parts.sum(), parts[0], parts[1]), normal.dot(p - origin)};
+}
+
+/// Of the faces that meet in the nearest point, the one over which the point lies most.
+std::size_t face_below(const Surfaces& surfaces, std::size_t body, std::size_t nearest, const Vec2& at, const Vec3& p,
+                       const std::vector<Vec3>& reference) {
+  constexpr double round_off = 1e-6;
+  const auto& nodes = surfaces.faces[nearest].nodes;
+  const Vec3 foot = (1 - at.sum()) * reference[nodes[0]] + at[0] * reference[nodes[1]] + at[1] * reference[nodes[2]];
+  std::size_t best = nearest;
+  double most = over_facet(nodes, p, reference).second;
+  for (std::size_t f = surfaces.first[body]; f < surfaces.first[body + 1]; ++f) {
+    const auto& others = surfaces.faces[f].nodes;
+    if (std::ranges::find_first_of(nodes, others) == nodes.end()) {
+      continue;
+    }
+    const auto [shares, off] = over_facet(others, foot, reference);
+    const double height = over_facet(others, p, reference).second;
+    const bool meets = shares.minCoeff() > -round_off &&
+                       std::abs(off) < round_off * (reference[others[1]] - reference[others[0]]).norm();
+    if (meets && height > most) {
+      most = height;
+      best = f;
+    }
+  }
+  return best;
+}
+
 /// The tetrahedron that holds a point, or of several, or none, the one with the largest smallest coordinate.
 /// Cost: linear in the tetrahedra, for each point.
 std::pair<std::size_t, Eigen::Vector4d> find_tetrahedron(const TetMesh& mesh, const Vec3& p) {
@@ -91,9 +128,45 @@ std::pair<std::size_t, Eigen::Vector4d> find_tetrahedron(const TetMesh& mesh, co
   return best;
 }
 
+bool is_on_solid(const Carried& c) { return c.carriers.size() == 4 || c.height; }
+
 Vec3 turned_offset(const Carried& c, const Configuration& configuration, int k) {
   return c.shares[k] * (configuration.rotation[c.carriers[k]] * c.offset);
 }
+
+/// The normal of a triangle of points, and how it turns with them.
+class FacetNormal {
+public:
+  FacetNormal(const std::vector<Index>& nodes, const std::vector<Vec3>& reference, const Configuration& configuration) {
+    const auto place = [&](std::size_t k) { return Vec3(reference[nodes[k]] + configuration.displacement[nodes[k]]); };
+    const Vec3 first = place(1) - place(0), second = place(2) - place(0);
+    const Vec3 twice = first.cross(second);
+    length_ = twice.norm();
+    normal_ = twice / length_;
+    across_ = (Mat3::Identity() - normal_ * normal_.transpose()) / length_;
+    of_points_ = {skew(second) - skew(first), -skew(second), skew(first)};
+  }
+
+  [[nodiscard]] const Vec3& normal() const { return normal_; }
+  [[nodiscard]] Mat3 derivative(std::size_t k) const { return across_ * of_points_[k]; }  ///< by point k
+  /// Of force.n, by points i and j.
+  [[nodiscard]] Mat3 second_derivative(const Vec3& force, std::size_t i, std::size_t j) const {
+    constexpr std::array<double, 3> first{-1, 1, 0}, second{-1, 0, 1};
+    const Vec3 g = across_ * force;
+    const Vec3 a = of_points_[i].transpose() * g, b = of_points_[j].transpose() * g;
+    const Vec3 n_i = of_points_[i].transpose() * normal_, n_j = of_points_[j].transpose() * normal_;
+    return (second[i] * first[j] - first[i] * second[j]) * skew(g) -
+           (a * n_j.transpose() + n_i * b.transpose() +
+            force.dot(normal_) * of_points_[i].transpose() * across_ * of_points_[j]) /
+               length_;
+  }
+
+private:
+  double length_ = 0;
+  Vec3 normal_;
+  Mat3 across_;
+  std::array<Mat3, 3> of_points_;  // derivatives of twice the area's vector
+};
 
 /// d x / d (6 per carrier).
 Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surfaces& surfaces,
@@ -101,9 +174,15 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surf
                                                     const Configuration& configuration) {
   const auto count = narrow<Eigen::Index>(c.carriers.size());
   Eigen::Matrix<double, 3, Eigen::Dynamic> result = Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, 6 * count);
-  if (count == 4) {
-    for (Eigen::Index k = 0; k < 4; ++k) {
+  if (is_on_solid(c)) {
+    for (Eigen::Index k = 0; k < count; ++k) {
       result.block<3, 3>(0, 6 * k).diagonal().setConstant(c.shares[k]);
+    }
+    if (c.height) {
+      const FacetNormal facet(c.carriers, reference, configuration);
+      for (std::size_t k = 0; k < 3; ++k) {
+        result.block<3, 3>(0, first_freedom(k)) += *c.height * facet.derivative(k);
+      }
     }
     return result;
   }
@@ -121,6 +200,10 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surf
 std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces, const std::vector<Vec3>& reference) {
   std::map<Index, Carried> found;
   std::map<std::size_t, BodySurface> carriers;
+  const Configuration rest = Configuration::at_rest(reference.size());
+  const auto nearest_of = [&](std::size_t body, const Vec3& x) {
+    return carriers.try_emplace(body, surfaces, body, reference).first->second.nearest(x);
+  };
   for (const Attachment& attachment : model.attachments) {
     const auto fail = [&](const std::string& what) {
       throw InputError(fmt::format("{}{} on {}: {}", attachment.said_at.empty() ? "" : attachment.said_at + ": ",
@@ -139,20 +222,29 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
               "fewer nodes",
               local));
         }
-        const auto offset = narrow<Index>(model.first_node(attachment.to));
-        for (const Index v : mesh.tetrahedra[t]) {
-          c.carriers.push_back(v + offset);
+        if (shares.minCoeff() < -inside) {
+          const auto [face, b] = nearest_of(attachment.to, x);
+          c.face = face_below(surfaces, attachment.to, face, b, x, reference);
+          const auto& nodes = surfaces.faces[c.face].nodes;
+          c.carriers.assign(nodes.begin(), nodes.end());
+          const auto [shares_on_face, height] = over_facet(nodes, x, reference);
+          c.shares << shares_on_face, 0;
+          c.height = height;
+        } else {
+          const auto offset = narrow<Index>(model.first_node(attachment.to));
+          for (const Index v : mesh.tetrahedra[t]) {
+            c.carriers.push_back(v + offset);
+          }
+          c.shares = shares;
         }
-        c.shares = shares;
       } else {
-        const auto place = carriers.try_emplace(attachment.to, surfaces, attachment.to, reference).first;
-        const auto [face, b] = place->second.nearest(x);
+        const auto [face, b] = nearest_of(attachment.to, x);
         c.face = face;
         const SurfaceFace& on = surfaces.faces[face];
         c.weights = patch_weights(on, b);
         c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
         c.carriers.assign(on.nodes.begin(), on.nodes.end());
-        c.offset = x - PatchMap(on, reference, Configuration::at_rest(reference.size())).point(c.weights);
+        c.offset = x - PatchMap(on, reference, rest).point(c.weights);
         double longest = 0;
         for (int k = 0; k < 3; ++k) {
           longest = std::max(longest, (reference[on.nodes[(k + 1) % 3]] - reference[on.nodes[k]]).norm());
@@ -200,9 +292,13 @@ void place_carried(const std::vector<Carried>& carried, const Surfaces& surfaces
                    Configuration& configuration) {
   for (auto c = carried.rbegin(); c != carried.rend(); ++c) {
     Vec3 u = Vec3::Zero();
-    if (c->carriers.size() == 4) {
-      for (int k = 0; k < 4; ++k) {
-        u += c->shares[k] * configuration.displacement[c->carriers[k]];
+    if (is_on_solid(*c)) {
+      for (std::size_t k = 0; k < c->carriers.size(); ++k) {
+        u += c->shares[narrow<Eigen::Index>(k)] * configuration.displacement[c->carriers[k]];
+      }
+      if (c->height) {
+        u += *c->height * (FacetNormal(c->carriers, reference, configuration).normal() -
+                           FacetNormal(c->carriers, reference, Configuration::at_rest(reference.size())).normal());
       }
     } else {
       u = PatchMap(surfaces.faces[c->face], reference, configuration).point(c->weights) - reference[c->node];
@@ -277,7 +373,16 @@ void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, con
         tangent->block(tangent->find(row, c.carriers[k])) += column * j.middleCols<6>(first_freedom(k));
       }
     }
-    if (count == 4) {
+    if (c.height) {
+      const FacetNormal facet(c.carriers, reference, configuration);
+      for (std::size_t row = 0; row < 3; ++row) {
+        for (std::size_t column = 0; column < 3; ++column) {
+          tangent->block(tangent->find(c.carriers[row], c.carriers[column])).topLeftCorner<3, 3>() +=
+              *c.height * facet.second_derivative(force, row, column);
+        }
+      }
+    }
+    if (is_on_solid(c)) {
       continue;
     }
     PatchMap map(surfaces.faces[c.face], reference, configuration);

@@ -12,6 +12,7 @@
 #include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/incidence.hpp"
 #include "tunica/surface/mesh/measure.hpp"
+#include "tunica/surface/mesh/tet_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -22,6 +23,7 @@
 #include <cmath>
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <utility>
 
 namespace tunica {
@@ -420,7 +422,10 @@ bool stays_zero(const Ramp& ramp, const RunSettings& settings) {
 
 std::string zero_when(const RunSettings& settings, const char* so) {
   return std::holds_alternative<StaticRun>(settings.kind)
-             ? "at every load step, so that no state shows it: take more (--load-steps, load_steps)"
+             ? "at every load step: it acts between them alone, and no state is written under it; take more "
+               "(--load-steps, load_steps)"
+         : std::holds_alternative<FrequencyRun>(settings.kind)
+             ? "where the frequencies are found: they are those without it"
              : fmt::format("during the whole run, {}", so);
 }
 
@@ -482,6 +487,13 @@ void doubt_loads(const Model& model, const RunSettings& settings,
                                    pressure_text(*pressure->imaged_at), *pressure->imaged_at / mmhg,
                                    meant(*pressure->imaged_at, {1e-3, mmhg / 1e-3}, {7e-4, most_in_image},
                                          [](double mpa) { return fmt::format("{:.4g} mmHg", mpa / mmhg); }))});
+    } else if (pressure != nullptr && pressure->imaged_at.value_or(0) > 0 && pressure->value > most_in_image) {
+      found.push_back(
+          {Weight::minor, "imaging pressure",
+           fmt::format("{}: {}, {:.3g} mmHg, is more than any organ bears, imaged under {:.3g} mmHg{}", where,
+                       pressure_text(pressure->value), pressure->value / mmhg, *pressure->imaged_at / mmhg,
+                       meant(pressure->value, {1e-3, mmhg / 1e-3}, {7e-4, most_in_image},
+                             [](double mpa) { return fmt::format("{:.4g} mmHg", mpa / mmhg); }))});
     }
   }
   for (const Fix& fix : model.fixes) {
@@ -567,6 +579,45 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
   return found;
 }
 
+namespace {
+
+double mean_edge(const std::vector<Vec3>& vertices, const std::vector<std::array<Index, 3>>& triangles) {
+  double sum = 0;
+  for (const auto& [a, b, c] : triangles) {
+    sum +=
+        ((vertices[b] - vertices[a]).norm() + (vertices[c] - vertices[b]).norm() + (vertices[a] - vertices[c]).norm()) /
+        3;
+  }
+  return sum / real(std::max<std::size_t>(1, triangles.size()));
+}
+
+/// A shell on a solid whose tetrahedra are smaller than its triangles: its nodes press dents between which nothing
+/// does.
+std::optional<Warning> doubt_of_coarse_skin(const Model& model, std::size_t solid) {
+  constexpr double much_finer = 0.75;
+  const std::size_t body = model.shells.size() + solid;
+  const TetMesh& mesh = model.solids[solid].mesh;
+  for (const Attachment& attachment : model.attachments) {
+    if (attachment.to != body || model.is_solid(attachment.body)) {
+      continue;
+    }
+    const ShellBody& skin = model.shells[attachment.body];
+    const double carried = mean_edge(skin.mesh.vertices, skin.mesh.triangles);
+    const double carries = mean_edge(mesh.vertices, boundary_triangles(mesh));
+    if (carries < much_finer * carried) {
+      return Warning{Weight::minor, "coarse skin",
+                     fmt::format("{}: carries {}, whose edges of {:.3g} mm are longer than its own of {:.3g} mm: the "
+                                 "nodes dent it, so that it gives way too much, by up to about its strain times {:.3g} "
+                                 "mm; take a finer mesh of {}, or larger tetrahedra",
+                                 named(model.solids[solid].said_at, model.solids[solid].name), skin.name, carried,
+                                 carries, carried, skin.name)};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors) {
   constexpr double notable = 0.05, large = 0.2;
   // Of beams and blocks that are one to ten tetrahedra thick, of any Poisson's ratio.
@@ -576,7 +627,9 @@ std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<doub
   }
   std::vector<Warning> found;
   for (std::size_t s = 0; s < errors.size(); ++s) {
-    if (const double error = errors[s]; error > notable) {
+    if (auto skin = doubt_of_coarse_skin(model, s)) {
+      found.push_back(*std::move(skin));  // what the jumps of stress say, too, is of its dents
+    } else if (const double error = errors[s]; error > notable) {
       const SolidBody& body = model.solids[s];
       found.push_back(
           {error > large ? Weight::major : Weight::minor, "coarse solid",

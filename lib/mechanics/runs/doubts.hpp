@@ -24,8 +24,9 @@ bool is_loaded(const Model& model);
 /// @param has_estimates  the errors of the answers are estimated: that says more of the shells than their shape
 std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool has_estimates = false);
 
-/// Solids whose tetrahedra are coarse for what they bear. @param errors  ElementFields::solid_error of the state
-/// Errors: InputError: not one per solid. Cost: none.
+/// Solids whose tetrahedra are coarse for what they bear, or finer than a skin that they carry.
+/// @param errors  ElementFields::solid_error of the state
+/// Errors: InputError: not one per solid. Cost: linear.
 std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors);
 
 /// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".

@@ -242,7 +242,7 @@ std::vector<Warning> doubts_of_meeting_walls(const Model& model) {
           {Weight::major, "surface crosses itself",
            fmt::format(
                "{}: passes through itself in {} pairs of faces, the first at {}: the numbers of the wall around "
-               "there mean nothing: mend the surface, or take a finer mesh",
+               "there mean nothing: mend or smooth the surface (SMOOTH), or take a finer mesh",
                label_of(model, bodies[0]), what.first, where(what.second))});
       continue;
     }

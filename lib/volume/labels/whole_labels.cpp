@@ -32,7 +32,41 @@ Wholeness wholeness_of(const T* values, std::size_t count, const Volume& slab) {
   return sum;
 }
 
+constexpr std::size_t many_values = 32;
+constexpr double many_differ = 0.2;  // of neighbours: between labels it is a few in a hundred
+
 }  // namespace
+
+void Neighbours::add(const Volume& slab) {
+  require_volume(slab);
+  std::visit(
+      [&](const auto& stored) {
+        const std::size_t row = slab.dims[0];
+        for (std::size_t i = 0; i < stored.size(); ++i) {
+          if (i % (1 << 20) == 0) {
+            check_interrupt();
+          }
+          const double value = slab.slope * static_cast<double>(stored[i]) + slab.intercept;
+          if (value == 0 || !std::isfinite(value)) {
+            continue;
+          }
+          if (values.size() < many_values) {
+            values.insert(value);
+          }
+          if (i % row == 0) {
+            continue;
+          }
+          const double before = slab.slope * static_cast<double>(stored[i - 1]) + slab.intercept;
+          pairs += before != 0 ? 1 : 0;
+          differing += before != 0 && before != value ? 1 : 0;
+        }
+      },
+      slab.data);
+}
+
+bool Neighbours::are_grey() const {
+  return values.size() >= many_values && real(differing) > many_differ * real(pairs);
+}
 
 void Wholeness::add(const Volume& slab) {
   require_volume(slab);

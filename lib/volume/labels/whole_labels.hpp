@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <set>
 
 namespace tunica {
 
@@ -30,6 +31,17 @@ struct Wholeness {
   /// Errors: InputError: no volume. Cost: one pass; none over the whole numbers of a volume without scaling, whose
   /// not_zero then stays 0. Parallel.
   void add(const Volume& slab);
+};
+
+/// Whether values are those of a grey volume or of probabilities, though whole numbers: many, and neighbours differ.
+/// Borders between labels are few beside the voxels within them.
+struct Neighbours {
+  std::set<double> values;    ///< the first of those that are not zero
+  std::size_t pairs = 0;      ///< of neighbouring voxels in rows that are both not zero
+  std::size_t differing = 0;  ///< of these
+
+  void add(const Volume& slab);  ///< Errors: InputError: no volume. Cost: one pass.
+  [[nodiscard]] bool are_grey() const;
 };
 
 }  // namespace tunica

@@ -4,6 +4,7 @@
 #include "tets.hpp"
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
+#include "tunica/mechanics/runs/doubts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -54,10 +55,10 @@ Model solid_on_shell() {
   return model;
 }
 
-/// A flat shell on the upper face of a block, its nodes not the block's.
-Model shell_on_solid() {
+/// A flat shell on the upper face of a block, or over it, its nodes not the block's.
+Model shell_on_solid(double height = 0) {
   Model model;
-  const Grid grid = make_grid(5, 4, [](double u, double v) { return Vec3(4 * u - 2, 4 * v - 2, 1); });
+  const Grid grid = make_grid(5, 4, [&](double u, double v) { return Vec3(4 * u - 2, 4 * v - 2, 1 + height); });
   model.shells.push_back(flat_body(grid.mesh, 100, 0.3, 0.1));
   model.solids.push_back(
       {"solid", box(3, 3, 2, Vec3(-2, -2, -1), Vec3(2, 2, 1)), {1, 0.4, std::nullopt}, SolidLaw::neo_hookean});
@@ -114,9 +115,31 @@ TEST(Carried, WhatNothingHoldsIsRefusedWithAllThatIsAttached) {
 }
 
 TEST(Carried, AShellOnASolidFollowsItsRigidMotion) {
-  EXPECT_LT(rigid_error(
-                shell_on_solid(), 1, [](const Vec3& x) { return x.z() < -1 + eps; }, 0.6),
-            1e-8);
+  for (const double height : {0.0, 0.3}) {
+    EXPECT_LT(rigid_error(
+                  shell_on_solid(height), 1, [](const Vec3& x) { return x.z() < -1 + eps; }, 0.6),
+              1e-8);
+  }
+}
+
+/// A column of 2 mm, E = 1 MPa, under 1 kPa on the shell over it gives way by 2 um, however far the shell is off.
+TEST(Carried, TheDistanceOfAShellFromASolidGivesWayByNothing) {
+  for (const double height : {0.0, 0.05, 0.3}) {
+    Model model = shell_on_solid(height);
+    model.shells[0].material.poisson = model.solids[0].material.poisson = 0;
+    move_nodes(
+        model, 1, [](const Vec3& x) { return x.z() < -1 + eps; }, [](const Vec3&) { return Vec3(0, 0, 0); });
+    model.loads.push_back({0, PressureLoad{-1e-3, false}, {}});
+    for (const RunSettings& settings : {linear_run(), nonlinear_run({1})}) {
+      const State state = last_state(model, settings);
+      double mean = 0;
+      const std::size_t count = model.shells[0].mesh.vertices.size();
+      for (std::size_t i = 0; i < count; ++i) {
+        mean += state.displacement[i].z() / static_cast<double>(count);
+      }
+      EXPECT_NEAR(mean, -2e-3, 6e-5) << height;  // its nodes dent the block
+    }
+  }
 }
 
 TEST(Carried, ASolidOnAShellFollowsItsRigidMotion) {
@@ -127,7 +150,7 @@ TEST(Carried, ASolidOnAShellFollowsItsRigidMotion) {
 
 /// A rotated configuration, put there by hand: carried nodes are exactly in their places, and nothing pulls.
 TEST(Carried, RigidMotionsGiveNoForce) {
-  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
     const ShellSystem system = make_system(model);
     const Eigen::Quaterniond turn = exponential(Vec3(0.7, -1.1, 0.4));
     Configuration moved = reference_configuration(system);
@@ -178,7 +201,7 @@ TEST(Carried, ABodyThatFloatsIsAsFarBeyondALinearRunAsIsSaid) {
 
 /// What acts on the nodes that are left does the same work, and has the same sum and moment, as before.
 TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
-  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
     const ShellSystem system = make_system(model);
     Random random(13);
     Configuration moved = reference_configuration(system);
@@ -214,7 +237,7 @@ TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
 
 /// The tangent of what is left, with the curvature of the map under the carried forces.
 TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
-  for (const Model& model : {shell_on_solid(), solid_on_shell()}) {
+  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
     const ShellSystem system = make_system(model);
     Random random(13);
     const Eigen::Index size = first_freedom(system.node_count());
@@ -310,6 +333,15 @@ TEST(Carried, OfFacesThatCrossTheFinerOneShouldBeCarried) {
     EXPECT_GT(stacked_error(fine, coarse, SolidLaw::corotational, false),
               3 * stacked_error(coarse, fine, SolidLaw::corotational, false));
   }
+}
+
+TEST(Carried, ASkinThatIsCoarserThanItsSolidIsDoubted) {
+  Model model = shell_on_solid();
+  EXPECT_THAT(doubts_of_solids(model, {0}), testing::IsEmpty());
+  model.solids[0].mesh = box(9, 9, 4, Vec3(-2, -2, -1), Vec3(2, 2, 1));
+  const std::vector<Warning> found = doubts_of_solids(model, {0.1});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].kind, "coarse skin");
 }
 
 TEST(Carried, ANodeCarriedTwiceIsNamed) {

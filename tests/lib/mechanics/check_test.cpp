@@ -365,7 +365,7 @@ TEST(Doubts, LoadsThatAreZeroAndNoneAtAll) {
   Model moved = plate();
   moved.fixes.back().displacement = Vec3(0, 0, 0.1);
   moved.fixes.back().ramp.points = {{0, 0}, {0.5, 1}, {1, 0}};
-  EXPECT_THAT(doubts_of(moved), ElementsAre(HasSubstr("zero at every load step, so that no state shows it")));
+  EXPECT_THAT(doubts_of(moved), ElementsAre(HasSubstr("zero at every load step: it acts between them alone")));
   model.loads[0].ramp.points = {{0, 0}, {1, 1}};
   EXPECT_THAT(doubts_of(model), IsEmpty());
   model.loads.clear();

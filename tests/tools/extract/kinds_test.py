@@ -127,6 +127,16 @@ class WholeNumbers(ExtractTest):
             self.assertIn(f"a grey volume: {saying[0]}", self.done.stdout)
             self.run_tool(path, self.out, *isovalue.split())
 
+    def test_probabilities_from_0_to_255_are_doubted(self):
+        """Labels that touch, as many and as thin as they may be, are not."""
+        places = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(40) - 20], indexing="ij"))
+        radius = numpy.sqrt((places ** 2).sum(axis=0))
+        blurred = numpy.clip(255 * (14 - radius) / 5, 0, 255).astype(numpy.uint8)
+        parcels = numpy.where(radius < 18, 1 + (places // 8 + 3).transpose(1, 2, 3, 0) @ [1, 6, 36], 0).astype(numpy.uint8)
+        for array, label, doubted in ((blurred, 255, True), (parcels, int(parcels[20, 20, 20]), False)):
+            report = self.run_tool(self.nifti(array), self.out, "--label", label, "--force")
+            self.assertEqual("looks like a grey volume" in " ".join(report["warnings"]), doubted, label)
+
     def test_beyond_doubles_are_refused(self):
         for label in (2 ** 53 + 1, 2 ** 63 - 1):
             path = self.folder / "v.nii.gz"

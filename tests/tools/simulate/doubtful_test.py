@@ -70,6 +70,17 @@ class Doubtful(SimulateTest):
                        '[[attach]]\nbody = "t"\nwhere = {below = {axis = "x", at = "20mm"}}\nto = "s"\n')
             self.assertEqual("the joint is a hinge" in " ".join(self.warned("--scene", "strips.toml")), hinged)
 
+    def test_a_patch_in_a_hole_is_hinged_at_its_rim(self):
+        vertices, triangles = grid(20, 20, 20, 20)
+        middle = np.all(np.abs(vertices[triangles].mean(axis=1)[:, :2] - 10) < 5, axis=1)
+        write_ply(self.path("frame.ply"), vertices, triangles[~middle])
+        write_ply(self.path("patch.ply"), vertices, triangles[middle])
+        other = "".join(part.replace('"s"', '"t"') for part in (shell("patch.ply", .5, 1, 0.3), load("pressure", "1Pa")))
+        self.write("patched.toml", run_lines(kind="static") + shell("frame.ply", .5, 1, 0.3) +
+                   fix(np.flatnonzero(vertices[:, 0] < 0.1)) + other +
+                   '[[attach]]\nbody = "t"\nwhere = {boundary = true}\nto = "s"\n')
+        self.assertIn("the joint is a hinge", " ".join(self.warned("--scene", "patched.toml")))
+
     def test_a_wall_without_an_inner_face(self):
         self.assertIn("is more than the radius of curvature", self.warned("ball.ply", *words(thickness="12mm"), *HELD)[0])
         self.run_tool("ball.ply", "out.hdf", *words(thickness="21mm"), *HELD, "--force", code=3,
