@@ -621,8 +621,9 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
   }
   // Sentences that name their places themselves.
   std::ranges::for_each(doubts_of_solids(model, last.solid_error), context.warn);
+  std::ranges::for_each(doubts_of_layers(model, last.layer_error), context.warn);
   std::ranges::for_each(swings_of(model, recorded.ended), context.warn);
-  std::ranges::for_each(doubts_of_suction(model, settings.scene.run), context.warn);
+  std::ranges::for_each(doubts_of_suction(model, settings.scene.run, record.summary->snaps), context.warn);
 }
 
 }  // namespace

@@ -212,6 +212,7 @@ void RunRecord::take(const Model& model, const State& state, const ElementFields
           fields.displacement_p99,
           fields.solid_strain_p99,
           fields.solid_error,
+          fields.layer_error,
           count_unresolved(model, state, most_bending),
           peak};
   if (!volume_before) {

@@ -295,18 +295,19 @@ void warn_of_small_region(const Model& model, std::size_t body, const std::vecto
   }
 }
 
-/// Carried nodes are free to turn: those of no whole triangle are a hinge, along a rim as along a straight line.
+/// A solid lets the nodes that it carries turn: those of no whole triangle are a hinge, along a rim as along a line.
 void warn_of_hinge(const Model& model, const Attachment& attachment, std::vector<Warning>& warnings) {
-  if (model.is_solid(attachment.body) || attachment.nodes.size() < 2) {
+  if (model.is_solid(attachment.body) || !model.is_solid(attachment.to) || attachment.nodes.size() < 2) {
     return;
   }
   const std::vector<double> whole = whole_triangles(model.shells[attachment.body].mesh.triangles, attachment.nodes);
   if (std::ranges::all_of(whole, [](double share) { return share == 0; })) {
-    warnings.push_back({Weight::major, "hinge",
-                        fmt::format("{}: the nodes that are carried lie along a line, and carried nodes are free to "
-                                    "turn: the joint is a hinge, which bears no bending; to clamp it let the bodies "
-                                    "overlap by a shell or more, and attach all of that strip ({{touching}})",
-                                    attachment.said_at)});
+    warnings.push_back(
+        {Weight::major, "hinge",
+         fmt::format("{}: the nodes that are carried lie along a line, and a solid lets them turn: the joint "
+                     "is a hinge, which bears no bending; to clamp it let the bodies overlap by a shell "
+                     "or more, and attach all of that strip",
+                     attachment.said_at)});
   }
 }
 

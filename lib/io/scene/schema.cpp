@@ -494,7 +494,8 @@ SceneKeys<SceneAttach> attach_keys() {
   return {key("body", &Attach::body, name).needed(),
           key("where", &Attach::where, form::selection(true),
               "also {touching = \"0.1mm\"}: nodes at most that far from `side`; all other forms attach up to a shell's "
-              "length away. What is carried is free to turn: along a line or a rim alone it is a hinge")
+              "length away. Shells turn with a shell that carries them; a solid lets them turn: along a line or a "
+              "rim alone that is a hinge")
               .needed(),
           key("to", &Attach::to, name, "the body that carries them").needed(),
           {"side", "where on the wall of a shell `touching` measures; what is carried keeps its distance",

@@ -130,9 +130,55 @@ std::pair<std::size_t, Eigen::Vector4d> find_tetrahedron(const TetMesh& mesh, co
 
 bool is_on_solid(const Carried& c) { return c.carriers.size() == 4 || c.height; }
 
-Vec3 turned_offset(const Carried& c, const Configuration& configuration, int k) {
-  return c.shares[k] * (configuration.rotation[c.carriers[k]] * c.offset);
-}
+/// The mean of three rotations, shared: the direction of the mean quaternion p = sum of b_k q_k.
+class MeanRotation {
+public:
+  MeanRotation(const Carried& c, const Configuration& configuration) : shares_(c.shares.head<3>()) {
+    const Eigen::Quaterniond& first = configuration.rotation[c.carriers[0]];
+    std::array<Eigen::Vector4d, 3> q;
+    Eigen::Vector4d p = Eigen::Vector4d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      q[k] = configuration.rotation[c.carriers[k]].coeffs();
+      q[k] *= q[k].dot(first.coeffs()) < 0 ? -1 : 1;  // both signs are the same rotation
+      p += shares_[k] * q[k];
+    }
+    length_ = p.norm();
+    rotation_.coeffs() = p / length_;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Quaterniond apart = Eigen::Quaterniond(q[k]) * rotation_.conjugate();
+      cosine_[k] = apart.w();
+      sine_[k] = apart.vec();
+    }
+  }
+
+  [[nodiscard]] const Eigen::Quaterniond& rotation() const { return rotation_; }
+
+  /// Its spin by that of node k.
+  [[nodiscard]] Mat3 derivative(int k) const {
+    return shares_[k] / length_ * (cosine_[k] * Mat3::Identity() - skew(sine_[k]));
+  }
+
+  /// Of the moment of node i under a moment on the mean, by the spin of node j.
+  [[nodiscard]] Mat3 second_derivative(const Vec3& moment, int i, int j) const {
+    const Mat3 turned = skew(moment);
+    const Mat3 by_mean =
+        0.5 * (moment * sine_[i].transpose() + turned * (cosine_[i] * Mat3::Identity() + skew(sine_[i])));
+    Mat3 result = shares_[i] / length_ * by_mean * derivative(j) +
+                  shares_[j] / (2 * length_) * derivative(i).transpose() * moment * sine_[j].transpose();
+    if (i == j) {
+      result -= shares_[i] / (2 * length_) *
+                (moment * sine_[i].transpose() + turned * (cosine_[i] * Mat3::Identity() - skew(sine_[i])));
+    }
+    return result;
+  }
+
+private:
+  Vec3 shares_;
+  double length_ = 0;
+  Eigen::Quaterniond rotation_;
+  std::array<double, 3> cosine_{};  // of q_k q*, half the rotation from the mean to node k
+  std::array<Vec3, 3> sine_;
+};
 
 /// The normal of a triangle of points, and how it turns with them.
 class FacetNormal {
@@ -168,12 +214,13 @@ private:
   std::array<Mat3, 3> of_points_;  // derivatives of twice the area's vector
 };
 
-/// d x / d (6 per carrier).
-Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surfaces& surfaces,
-                                                    const std::vector<Vec3>& reference,
-                                                    const Configuration& configuration) {
+/// By 6 per carrier: of x, and of the spin where it turns.
+using Derivative = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 24>;
+
+Derivative derivative(const Carried& c, const Surfaces& surfaces, const std::vector<Vec3>& reference,
+                      const Configuration& configuration) {
   const auto count = narrow<Eigen::Index>(c.carriers.size());
-  Eigen::Matrix<double, 3, Eigen::Dynamic> result = Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, 6 * count);
+  Derivative result = Derivative::Zero(c.freedoms(), 6 * count);
   if (is_on_solid(c)) {
     for (Eigen::Index k = 0; k < count; ++k) {
       result.block<3, 3>(0, 6 * k).diagonal().setConstant(c.shares[k]);
@@ -188,9 +235,15 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> derivative(const Carried& c, const Surf
   }
   PatchMap map(surfaces.faces[c.face], reference, configuration);
   map.linearise();
-  result = map.derivative(c.weights);
+  result.topRows<3>() = map.derivative(c.weights);
+  const MeanRotation mean(c, configuration);
+  const Mat3 lever = skew(mean.rotation() * c.offset);
   for (int k = 0; k < 3; ++k) {
-    result.block<3, 3>(0, 6 * k + 3) -= skew(turned_offset(c, configuration, k));
+    const Mat3 spin = mean.derivative(k);
+    result.block<3, 3>(0, 6 * k + 3) -= lever * spin;
+    if (c.turns) {
+      result.block<3, 3>(3, 6 * k + 3) = spin;
+    }
   }
   return result;
 }
@@ -245,6 +298,7 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
         c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
         c.carriers.assign(on.nodes.begin(), on.nodes.end());
         c.offset = x - PatchMap(on, reference, rest).point(c.weights);
+        c.turns = !model.is_solid(attachment.body);
         double longest = 0;
         for (int k = 0; k < 3; ++k) {
           longest = std::max(longest, (reference[on.nodes[(k + 1) % 3]] - reference[on.nodes[k]]).norm());
@@ -302,8 +356,10 @@ void place_carried(const std::vector<Carried>& carried, const Surfaces& surfaces
       }
     } else {
       u = PatchMap(surfaces.faces[c->face], reference, configuration).point(c->weights) - reference[c->node];
-      for (int k = 0; k < 3; ++k) {
-        u += turned_offset(*c, configuration, k);
+      const Eigen::Quaterniond rotation = MeanRotation(*c, configuration).rotation();
+      u += rotation * c->offset;
+      if (c->turns) {
+        configuration.rotation[c->node] = rotation;
       }
     }
     configuration.displacement[c->node] = u;
@@ -338,19 +394,23 @@ void expand_carried(const std::vector<Carried>& carried, const Surfaces& surface
     for (std::size_t k = 0; k < c->carriers.size(); ++k) {
       of_carriers.segment<6>(first_freedom(k)) = increment.segment<6>(first_freedom(c->carriers[k]));
     }
-    increment.segment<3>(first_freedom(c->node)) = derivative(*c, surfaces, reference, configuration) * of_carriers;
+    const Derivative j = derivative(*c, surfaces, reference, configuration);
+    increment.segment(first_freedom(c->node), j.rows()) = j * of_carriers;
   }
 }
 
 void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, const std::vector<Vec3>& reference,
               const Configuration& configuration, VectorX& internal, BlockMatrix* tangent) {
   for (const Carried& c : carried) {
-    const auto j = derivative(c, surfaces, reference, configuration);
-    const Vec3 force = internal.segment<3>(first_freedom(c.node));
-    internal.segment<3>(first_freedom(c.node)).setZero();
+    const Derivative j = derivative(c, surfaces, reference, configuration);
+    const Eigen::Index rows = j.rows();
+    const Vector6 load = internal.segment<6>(first_freedom(c.node));
+    const Vec3 force = load.head<3>();
+    internal.segment(first_freedom(c.node), rows).setZero();
     const std::size_t count = c.carriers.size();
     for (std::size_t k = 0; k < count; ++k) {
-      internal.segment<6>(first_freedom(c.carriers[k])) += j.middleCols<6>(first_freedom(k)).transpose() * force;
+      internal.segment<6>(first_freedom(c.carriers[k])) +=
+          j.middleCols<6>(first_freedom(k)).transpose() * load.head(rows);
     }
     if (tangent == nullptr) {
       continue;
@@ -358,19 +418,20 @@ void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, con
     const std::size_t begin = tangent->row_start[c.node], end = tangent->row_start[c.node + 1];
     for (std::size_t place = begin; place < end; ++place) {  // its rows go to the carriers
       const Index column = tangent->column[place];
-      const Eigen::Matrix<double, 3, 6> row = tangent->block(place).topRows<3>();
-      tangent->block(place).topRows<3>().setZero();
+      const Matrix6 row = tangent->block(place);
+      tangent->block(place).topRows(rows).setZero();
       for (std::size_t k = 0; k < count; ++k) {
-        tangent->block(tangent->find(c.carriers[k], column)) += j.middleCols<6>(first_freedom(k)).transpose() * row;
+        tangent->block(tangent->find(c.carriers[k], column)) +=
+            j.middleCols<6>(first_freedom(k)).transpose() * row.topRows(rows);
       }
     }
     for (std::size_t place = begin; place < end; ++place) {  // and its columns
       const Index row = tangent->column[place];
       auto block = tangent->block(tangent->transposed[place]);
-      const Eigen::Matrix<double, 6, 3> column = block.leftCols<3>();
-      block.leftCols<3>().setZero();
+      const Matrix6 column = block;
+      block.leftCols(rows).setZero();
       for (std::size_t k = 0; k < count; ++k) {
-        tangent->block(tangent->find(row, c.carriers[k])) += column * j.middleCols<6>(first_freedom(k));
+        tangent->block(tangent->find(row, c.carriers[k])) += column.leftCols(rows) * j.middleCols<6>(first_freedom(k));
       }
     }
     if (c.height) {
@@ -388,15 +449,16 @@ void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, con
     PatchMap map(surfaces.faces[c.face], reference, configuration);
     map.linearise();
     const Matrix18 curvature = map.stiffness(PatchMap::Matrix27::Zero(), force * c.weights.transpose());
-    for (std::size_t row = 0; row < 3; ++row) {
-      for (std::size_t column = 0; column < 3; ++column) {
+    const MeanRotation mean(c, configuration);
+    const Vec3 d = mean.rotation() * c.offset;
+    const Vec3 moment = d.cross(force) + (c.turns ? Vec3(load.tail<3>()) : Vec3(Vec3::Zero()));
+    const Mat3 by_spin = d * force.transpose() - d.dot(force) * Mat3::Identity();  // d turns with it
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
         auto block = tangent->block(tangent->find(c.carriers[row], c.carriers[column]));
-        block += curvature.block<6, 6>(first_freedom(row), first_freedom(column));
-        if (row == column) {
-          // The moment is d x force; d turns with the spin.
-          const Vec3 d = turned_offset(c, configuration, narrow<int>(row));
-          block.block<3, 3>(3, 3) += d * force.transpose() - d.dot(force) * Mat3::Identity();
-        }
+        block += curvature.block<6, 6>(6 * row, 6 * column);
+        block.block<3, 3>(3, 3) += mean.derivative(row).transpose() * by_spin * mean.derivative(column) +
+                                   mean.second_derivative(moment, row, column);
       }
     }
   }

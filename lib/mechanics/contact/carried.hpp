@@ -8,19 +8,23 @@
 namespace tunica {
 
 /// A node that another body carries, and that is no unknown of its own:
-///   x = surface(b) + sum of b_k R_k d  on a face of a shell, d the offset in the reference (half a wall, and what the
-///                                      meshes leave);
+///   x = surface(b) + R(b) d            on a face of a shell, d the offset in the reference (half a wall, and what the
+///                                      meshes leave), R the mean of the rotations of its nodes, shared as b says;
 ///   x = sum of w_k x_k                 in a tetrahedron;
 ///   x = sum of w_k x_k + h n           over a face of a solid, n its normal: the strain of the solid ends at its face.
-/// Rigid motions of what carries it are followed exactly. A carried shell node keeps its rotation.
+/// Rigid motions of what carries it are followed exactly. A shell's node on a shell turns with R, as what is welded; on
+/// a solid, whose nodes have no rotation, it is free to turn.
 struct Carried {
   Index node = 0;
+  bool turns = false;              ///< with R
   std::vector<Index> carriers;     ///< global: three of a face, four of a tetrahedron
   std::size_t face = 0;            ///< of the surfaces; used where there are three carriers
   PatchWeights weights;            ///< of the points of a shell's face
   Eigen::Vector4d shares;          ///< barycentric coordinates, of three or four
   Vec3 offset = Vec3::Zero();      ///< mm, of a shell's face
   std::optional<double> height{};  ///< mm, over a face of a solid
+
+  [[nodiscard]] int freedoms() const { return turns ? 6 : 3; }  ///< that are no unknowns
 };
 
 /// The nodes of the model's attachments, each after all that it carries itself.

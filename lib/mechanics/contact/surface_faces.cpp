@@ -12,14 +12,23 @@
 namespace tunica {
 namespace {
 
-void add_shell(const ShellBody& body, std::size_t number, Index offset, std::vector<SurfaceFace>& faces) {
+/// @param bends  between its nodes, as they turn: so do flat facets then
+void add_shell(const ShellBody& body, std::size_t number, Index offset, bool bends, std::vector<SurfaceFace>& faces) {
   const TriangleMesh flat = flat_facets(body.mesh);
   const auto beside = neighbours(flat, incidence(flat));
+  const auto normal = [&](std::size_t t, std::size_t k) -> Vec3 {
+    if (body.curved) {
+      return body.mesh.normal(t, k);
+    }
+    const auto& v = flat.triangles[t];
+    return (flat.vertices[v[1]] - flat.vertices[v[0]]).cross(flat.vertices[v[2]] - flat.vertices[v[0]]).normalized();
+  };
+  const bool may_have_creases = !body.curved || !body.mesh.corner_normals.empty();
   for (std::size_t t = 0; t < body.mesh.triangles.size(); ++t) {
     const auto& v = body.mesh.triangles[t];
     SurfaceFace face;
     face.body = number;
-    face.curved = body.curved;
+    face.curved = body.curved || bends;
     face.young = body.material.young;
     std::array<Vec3, 3> x;
     double thickness = 0;
@@ -31,17 +40,17 @@ void add_shell(const ShellBody& body, std::size_t number, Index offset, std::vec
     face.half_thickness = thickness / 2;
     if (face.curved) {
       for (std::size_t k = 0; k < 3; ++k) {
-        face.normals[k] = body.mesh.normal(t, k);
+        face.normals[k] = normal(t, k);
       }
       face.across = own_normals_across(face.normals);
-      for (std::size_t k = 0; k < 3 && !body.mesh.corner_normals.empty(); ++k) {
+      for (std::size_t k = 0; may_have_creases && k < 3; ++k) {
         const Index other = beside[t][k];
         for (std::size_t l = 0; other != no_neighbour && l < 3; ++l) {
           const Index at = body.mesh.triangles[other][l];
           if (at == v[k]) {
-            face.across[k][0] = body.mesh.normal(other, l);
+            face.across[k][0] = normal(other, l);
           } else if (at == v[(k + 1) % 3]) {
-            face.across[k][1] = body.mesh.normal(other, l);
+            face.across[k][1] = normal(other, l);
           }
         }
       }
@@ -64,7 +73,9 @@ Surfaces surface_faces(const Model& model) {
     surfaces.first.push_back(surfaces.faces.size());
     const auto offset = narrow<Index>(model.first_node(b));
     if (!model.is_solid(b)) {
-      add_shell(model.shells[b], b, offset, surfaces.faces);
+      const bool carries =
+          std::ranges::any_of(model.attachments, [b](const Attachment& attachment) { return attachment.to == b; });
+      add_shell(model.shells[b], b, offset, carries, surfaces.faces);
       continue;
     }
     const SolidBody& body = model.solids[b - model.shells.size()];

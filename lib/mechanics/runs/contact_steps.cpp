@@ -45,12 +45,7 @@ ContactWork::ContactWork(const ShellSystem& system)
     : contact_(system.contact),
       rubs_(std::ranges::any_of(system.model->contacts, [](const Contact& contact) { return contact.friction > 0; })) {}
 
-void ContactWork::keep(const VectorX& forces, const FreeMask& free) {
-  touched_ = std::exchange(touching_, forces);
-  if (touching_.size() > 0) {
-    mask(free, touching_);
-  }
-}
+void ContactWork::keep(VectorX forces) { touched_ = std::exchange(touching_, std::move(forces)); }
 
 ContactWork::Work ContactWork::over(const VectorX& change) {
   if (!contact_) {

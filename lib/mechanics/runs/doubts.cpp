@@ -644,6 +644,20 @@ std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<doub
   return found;
 }
 
+std::vector<Warning> doubts_of_layers(const Model& model, const std::vector<double>& errors) {
+  constexpr double notable = 0.05, large = 0.2;
+  const auto worst = std::ranges::max_element(errors);
+  if (worst == errors.end() || *worst < notable) {
+    return {};
+  }
+  const ShellBody& body = model.shells[narrow<std::size_t>(worst - errors.begin())];
+  return {{*worst > large ? Weight::major : Weight::minor, "coarse layers",
+           fmt::format("{}: the shells of layers that are attached to each other are coarse for how they bend: by the "
+                       "jumps of membrane force between them, the layers give way by up to about {:.0f} % too much; "
+                       "take finer meshes: half the size leaves a quarter of that",
+                       named(body.said_at, body.name), 100 * *worst)}};
+}
+
 std::string pressure_text(double mpa) {
   constexpr std::array<std::pair<double, const char*>, 5> units{
       {{1e6, "TPa"}, {1e3, "GPa"}, {1, "MPa"}, {1e-3, "kPa"}, {1e-6, "Pa"}}};

@@ -29,6 +29,10 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
 /// Errors: InputError: not one per solid. Cost: linear.
 std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors);
 
+/// What doubts that layers of shells are fine enough for what they bear, at most one.
+/// @param errors  ElementFields::layer_error of the state
+std::vector<Warning> doubts_of_layers(const Model& model, const std::vector<double>& errors);
+
 /// A pressure or a stiffness (MPa) with the unit that suits it, Pa to TPa: "16 kPa".
 std::string pressure_text(double mpa);
 

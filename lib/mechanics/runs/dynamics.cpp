@@ -201,6 +201,20 @@ private:
   double length_before_ = 0;          ///< s
 };
 
+/// Free, or carried.
+FreeMask moving_freedoms(const ShellSystem& system) {
+  FreeMask moves = free_freedoms(system);
+  for (const Carried& c : system.carried) {
+    std::fill_n(moves.begin() + first_freedom(c.node), c.freedoms(), true);
+  }
+  return moves;
+}
+
+std::vector<bool> held_along_world(FreeMask moves) {
+  moves.flip();
+  return along_world(moves);
+}
+
 /// M a1 + alpha M v1 + f_int(x1) = f_ext(x1, t1), with velocity and acceleration at the end of a step as the scheme
 /// says. Damping is alpha M and, in each element's own frame, beta K times the rate of its deformation: a rigid motion
 /// is not damped by beta.
@@ -215,7 +229,8 @@ public:
         damping_(system, run.damping.stiffness, scheme_.second_order()),
         matrix_(system.pattern),
         mass_(lumped_masses(system)),
-        held_(along_world(system.held)),
+        moves_(moving_freedoms(system)),
+        held_(held_along_world(moves_)),
         contact_work_(system),
         part_(run.step) {
     solver_.emplace(system, settings);
@@ -251,10 +266,7 @@ public:
     if (!scheme_.second_order()) {
       return;
     }
-    for (Eigen::Index i = 0; i < mass_.size(); ++i) {
-      motion.rates.acceleration[i] = mass_[i] > 0 ? (forces_.external[i] - forces_.internal[i]) / mass_[i] : 0;
-    }
-    mask(solver_->free(), motion.rates.acceleration);
+    motion.rates.acceleration = accelerations(motion.configuration);
     motion.rates.auxiliary = motion.rates.acceleration;
   }
 
@@ -390,6 +402,31 @@ private:
     Rates rates;
   };
 
+  /// Of what is at rest, under the forces at hand.
+  VectorX accelerations(const Configuration& at) {
+    VectorX unbalanced = forces_.external - forces_.internal;
+    if (system_.carried.empty()) {
+      for (Eigen::Index i = 0; i < mass_.size(); ++i) {
+        unbalanced[i] = mass_[i] > 0 ? unbalanced[i] / mass_[i] : 0;
+      }
+      mask(solver_->free(), unbalanced);
+      return unbalanced;
+    }
+    BlockMatrix inertia = system_.pattern;  // what is carried weighs on several nodes
+    std::ranges::fill(inertia.values, 0.0);
+    for (Index i = 0; i < system_.node_count(); ++i) {
+      const Vector6 mass = mass_.segment<6>(first_freedom(i));
+      inertia.block(inertia.find(i, i)).diagonal() = (mass.array() > 0).select(mass, 1.0);
+    }
+    VectorX none = VectorX::Zero(mass_.size()), result;
+    condense(system_, at, none, &inertia);
+    condense(system_, at, unbalanced, nullptr);
+    mask(solver_->free(), unbalanced);
+    solver_->solve(inertia, unbalanced, result);
+    expand_carried(system_.carried, system_.surfaces, system_.reference, at, result);
+    return result;
+  }
+
   /// One step or part of one. Where Newton's method does not lead from the state before to the end at once, and it
   /// may_follow, the change (of loads, prescribed displacements, and what inertia leaves unbalanced at the start) is
   /// put on in parts; where that path loses its stability the shell is let go, and creeps to where the step's forces
@@ -448,15 +485,17 @@ private:
   /// Loads, and on held freedoms what moves them; apart from these, contact.
   void keep_acting(const Motion& motion) {
     acting_ = forces_.external;
-    if (forces_.contact.size() > 0) {
-      acting_ -= forces_.contact;
+    VectorX contact = forces_.contact;
+    if (contact.size() > 0) {
+      mask(moves_, contact);
+      acting_ -= contact;
     }
-    contact_work_.keep(forces_.contact, solver_->free());
-    mask(solver_->free(), acting_);
-    VectorX moving =
-        forces_.internal + mass_.cwiseProduct(motion.rates.acceleration + run_.damping.mass * motion.rates.velocity);
-    mask(system_.held, moving);
-    acting_ += moving;
+    contact_work_.keep(std::move(contact));
+    VectorX reaction = forces_.internal - forces_.external +
+                       mass_.cwiseProduct(motion.rates.acceleration + run_.damping.mass * motion.rates.velocity);
+    condense(system_, motion.configuration, reaction, nullptr);
+    mask(system_.held, reaction);
+    acting_ += reaction;
   }
 
   /// Balance of the step with a part of its change; 1: the equation of the step itself.
@@ -572,7 +611,8 @@ private:
   std::optional<TangentSolver> solver_;
   BlockMatrix matrix_;
   VectorX mass_;
-  const std::vector<bool> held_;  ///< along world axes
+  const FreeMask moves_;          ///< what is free or follows what is
+  const std::vector<bool> held_;  ///< the rest, along world axes
   Forces forces_;
   std::vector<ElementState> deformation_;  ///< at the start of the step
   VectorX change_;                         ///< displacements and rotations of the last part of a step

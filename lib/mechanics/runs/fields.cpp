@@ -73,6 +73,67 @@ std::vector<double> solid_errors(const ShellSystem& system, const std::vector<Ma
   return errors;
 }
 
+/// Of shells that are welded upon each other by whole triangles: what part of the bending stiffness of both layers each
+/// has of its own, without the other's distance. Of others zero.
+std::vector<double> own_shares_of_layers(const ShellSystem& system) {
+  const Model& model = *system.model;
+  std::vector<const Carried*> by_node(system.node_count(), nullptr);
+  for (const Carried& c : system.carried) {
+    by_node[c.node] = c.turns ? &c : nullptr;
+  }
+  std::vector<double> shares(system.elements.size(), 0);
+  const auto weld = [&](std::size_t e, const Carried& c) {
+    const ShellElement &one = system.elements[e], &other = system.elements[c.face];  // of the surfaces, shells first
+    const auto stretching = [&](const ShellElement& of) { return model.shells[of.body].material.young * of.thickness; };
+    const double own =
+        stretching(one) * one.thickness * one.thickness + stretching(other) * other.thickness * other.thickness;
+    const double together = stretching(one) * stretching(other) / (stretching(one) + stretching(other));
+    const double share = own / (own + 12 * together * c.offset.squaredNorm());
+    for (const std::size_t shell : {e, c.face}) {
+      shares[shell] = shares[shell] > 0 ? std::min(shares[shell], share) : share;
+    }
+  };
+  for (std::size_t e = 0; e < system.elements.size(); ++e) {
+    const auto& nodes = system.elements[e].nodes;
+    if (std::ranges::all_of(nodes, [&](Index node) { return by_node[node] != nullptr; })) {
+      std::ranges::for_each(nodes, [&](Index node) { weld(e, *by_node[node]); });
+    }
+  }
+  return shares;
+}
+
+/// Of ElementFields::layer_error. @param corners  recovered from `shells`
+std::vector<double> layer_errors(const ShellSystem& system, const std::vector<TensorPair>& shells,
+                                 const std::vector<std::array<TensorPair, 3>>& corners) {
+  const Model& model = *system.model;
+  const std::vector<double> own_share = own_shares_of_layers(system);
+  std::vector<std::array<double, 2>> energies(model.shells.size(), {0, 0});  // of all, of the differences
+  for (std::size_t e = 0; e < shells.size(); ++e) {
+    if (own_share[e] == 0) {
+      continue;
+    }
+    const ShellElement& element = system.elements[e];
+    const Mat3 compliance =
+        element.area / element.thickness * plane_stress(model.shells[element.body].material).inverse();
+    const auto energy = [&](const Vec3& force) { return force.dot(compliance * force); };
+    auto& [whole, jumps] = energies[element.body];
+    whole += energy(shells[e].force) + 12 / (element.thickness * element.thickness) * energy(shells[e].moment);
+    double off_energy = 0;
+    Vec3 sum = Vec3::Zero();
+    for (const TensorPair& corner : corners[e]) {
+      const Vec3 off = corner.force - shells[e].force;
+      off_energy += energy(off) / 12;  // the mass matrix of linear functions has 1 / 6 and 1 / 12
+      sum += off;
+    }
+    jumps += (off_energy + energy(sum) / 12) / own_share[e];
+  }
+  std::vector<double> errors;
+  for (const auto& [whole, jumps] : energies) {
+    errors.push_back(whole > 0 ? jumps / whole : 0);
+  }
+  return errors;
+}
+
 const Model& checked(const Model& model) {
   require_valid(model);
   return model;
@@ -304,6 +365,7 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
   }
   const auto strained_corners = recovery.at_corners(strained);
   const auto stressed_corners = system.prestress_residual ? recovery.at_corners(stressed) : strained_corners;
+  fields.layer_error = layer_errors(system, strained, strained_corners);
   CornerFields corners;
   std::vector<double> weight(model.node_count(), 0);
   double whole = 0, far_area = 0;

@@ -70,6 +70,10 @@ struct ElementFields {
   /// the stress averaged at the nodes: Zienkiewicz, Zhu 1987, "A simple error estimator and adaptive procedure for
   /// practical engineering analysis".
   std::vector<double> solid_error;
+  /// #shells: by what part layers that are welded upon each other give way too much, about. A shell stretches by one
+  /// number per triangle where, off the middle of both layers, it should by a linear function: the jumps of the
+  /// membrane force, as above, over the part of the layers' bending stiffness that each has of its own.
+  std::vector<double> layer_error;
 };
 
 /// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the

@@ -414,7 +414,8 @@ std::vector<Warning> doubts_of_loose_bodies(const Model& model, const RunSetting
   return found;
 }
 
-std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings) {
+std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings,
+                                       const std::vector<Snap>& snaps) {
   constexpr double sensitive = 0.2;
   require_valid(model);
   const bool alone =
@@ -442,6 +443,7 @@ std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& se
   } catch (const MemoryError&) {  // it would take more than the run, by cg, itself
     return {};
   }
+  factor = snaps.empty() ? factor : std::min(factor, snaps.front().load_factor);
   // The factor multiplies what comes on top of the image.
   const auto& pressure = std::get<PressureLoad>(sucked->kind);
   const double imaged = pressure.imaged_at.value_or(0);

@@ -28,6 +28,7 @@ std::vector<Warning> doubts_of_loose_bodies(const Model& model, const RunSetting
 /// A static run under suction above a fifth of the load at which the perfect shell buckles by the linear theory: real
 /// shells, never perfect, yield at a part of it (a sphere with a dimple one wall deep at .36). Nothing where shells are
 /// not alone. Cost: a linear buckling analysis, where there is suction at all.
-std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings);
+/// @param snaps  of the run itself, which may come before the load of linear buckling
+std::vector<Warning> doubts_of_suction(const Model& model, const RunSettings& settings, const std::vector<Snap>& snaps);
 
 }  // namespace tunica

@@ -238,24 +238,24 @@ double largest_move(const VectorX& moved) {
 
 }  // namespace
 
-double linear_departure(ShellSystem& system, const RunSettings& settings, const LinearSolution& solution,
-                        const std::vector<double>& factors) {
+double LinearSolver::departure(ShellSystem& system, const LinearSolution& solution,
+                               const std::vector<double>& factors) {
   BeyondLinear beyond(system, solution, factors);
   if (!(beyond.energy() > 0)) {
     return 0;  // nothing moves
   }
   BlockMatrix tangent = stressed_tangent(system, solution.moved, factors);
   symmetrise(tangent);
-  TangentSolver solver(system, settings);
   VectorX none;
+  factored_ = false;
   // Beyond the buckling load: a strip pushed along itself shows nothing else of it.
-  if (!solver.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite) {
+  if (!solver_.solve(tangent, VectorX::Zero(solution.moved.size()), none).positive_definite) {
     return 1;
   }
   const auto response_to = [&](VectorX left) {
-    mask(solver.free(), left);
+    mask(solver_.free(), left);
     VectorX response = VectorX::Zero(left.size());
-    solver.solve(tangent, left, response, true);
+    solver_.solve(tangent, left, response, true);
     expand(system, response);
     return response;
   };
@@ -344,8 +344,8 @@ private:
     const LinearSolution solution = solution_at(factor);
     if (is_last()) {
       const double most = *std::ranges::max_element(run_.load_factors, {}, [](double f) { return std::abs(f); });
-      summary_.linear_departure = linear_departure(system_, settings_, most == factor ? solution : solution_at(most),
-                                                   load_factors(model_, true, most));
+      summary_.linear_departure =
+          solver_.departure(system_, most == factor ? solution : solution_at(most), load_factors(model_, true, most));
     }
     return state_of(solution, factor);
   }

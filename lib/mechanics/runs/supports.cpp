@@ -241,12 +241,12 @@ HeldDirections held_directions(const ShellSystem& system) {
 
 using Edges = std::set<std::pair<Index, Index>>;  // by their ends
 
-/// Of rims that other bodies carry.
+/// Of rims that other bodies carry, and that may turn there.
 Edges carried_edges(const ShellSystem& system) {
   const Model& model = *system.model;
   std::vector<char> is_carried(system.node_count(), 0);
   for (const Carried& carried : system.carried) {
-    is_carried[carried.node] = 1;
+    is_carried[carried.node] = carried.turns ? 0 : 1;
   }
   Edges edges;
   for (std::size_t b = 0; !system.carried.empty() && b < model.shells.size(); ++b) {
@@ -364,7 +364,7 @@ void make_supports(ShellSystem& system) {
   }
   hold_balanced_motions(system);
   for (const Carried& c : system.carried) {
-    std::fill_n(system.held.begin() + first_freedom(c.node), 3, true);
+    std::fill_n(system.held.begin() + first_freedom(c.node), c.freedoms(), true);
   }
 }
 

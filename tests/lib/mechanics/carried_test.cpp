@@ -5,6 +5,7 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/runs/detail/shell_system.hpp"
 #include "tunica/mechanics/runs/doubts.hpp"
+#include "tunica/mechanics/runs/fields.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +56,31 @@ Model solid_on_shell() {
   return model;
 }
 
+Attachment all_nodes_of(const Model& model, std::size_t body, std::size_t to) {
+  Attachment attachment;
+  attachment.body = body;
+  attachment.to = to;
+  for (Index i = 0; i < model.shells[body].mesh.vertices.size(); ++i) {
+    attachment.nodes.push_back(i);
+  }
+  return attachment;
+}
+
+/// A curved shell over another, welded to it; flat facets where not `curved`.
+Model shell_on_shell(bool curved) {
+  Model model;
+  model.shells = {panel(4), panel(5)};
+  for (ShellBody& body : model.shells) {
+    body.curved = curved;
+    body.rest = curved ? Rest::curved : Rest::flat;
+  }
+  for (Vec3& x : model.shells[1].mesh.vertices) {
+    x = Vec3(0.8 * x.x(), 0.8 * x.y(), x.z() + 0.15);
+  }
+  model.attachments.push_back(all_nodes_of(model, 1, 0));
+  return model;
+}
+
 /// A flat shell on the upper face of a block, or over it, its nodes not the block's.
 Model shell_on_solid(double height = 0) {
   Model model;
@@ -62,14 +88,13 @@ Model shell_on_solid(double height = 0) {
   model.shells.push_back(flat_body(grid.mesh, 100, 0.3, 0.1));
   model.solids.push_back(
       {"solid", box(3, 3, 2, Vec3(-2, -2, -1), Vec3(2, 2, 1)), {1, 0.4, std::nullopt}, SolidLaw::neo_hookean});
-  Attachment attachment;
-  attachment.body = 0;
-  attachment.to = 1;
-  for (Index i = 0; i < grid.mesh.vertices.size(); ++i) {
-    attachment.nodes.push_back(i);
-  }
-  model.attachments.push_back(attachment);
+  model.attachments.push_back(all_nodes_of(model, 0, 1));
   return model;
+}
+
+/// Every kind of what carries what.
+std::vector<Model> all_kinds() {
+  return {shell_on_solid(), shell_on_solid(0.3), solid_on_shell(), shell_on_shell(true), shell_on_shell(false)};
 }
 
 /// Moves some nodes of the carrier rigidly; how far all others are from following.
@@ -148,9 +173,126 @@ TEST(Carried, ASolidOnAShellFollowsItsRigidMotion) {
             1e-8);
 }
 
+/// A strip of 40 by 8 mm, E = 1 MPa, of two layers of 1 mm, clamped at one end: its deflection, in that of a strip of 2
+/// mm, under a moment at the end of the lower one.
+double layered_strip(std::size_t lower, std::size_t upper, bool linear) {
+  constexpr double length = 40, moment = 4e-3, stiffness = 8 * 8 / 12.0;
+  Model model;
+  const auto strip = [&](std::size_t n, double z) {
+    return flat_body(make_grid(n, n / 5, [&](double u, double v) { return Vec3(length * u, 8 * v, z); }).mesh, 1, 0, 1);
+  };
+  model.shells = {strip(lower, 0), strip(upper, 1)};
+  model.attachments.push_back(all_nodes_of(model, 1, 0));
+  hold(
+      model, [](const Vec3& x) { return x.x() < eps; }, "xyz", "xyz");
+  MomentLoad load;
+  load.nodes = nodes_of(model, 0, [&](const Vec3& x) { return x.x() > length - eps; });
+  load.total = Vec3(0, -moment, 0);
+  model.loads.push_back({0, load, {}});
+  const State state = last_state(model, linear ? linear_run() : nonlinear_run({1}));
+  return state.displacement[load.nodes[load.nodes.size() / 2]].z() / (moment * length * length / 2 / stiffness);
+}
+
+/// Whatever the meshes: what is carried bends between the nodes of what carries it as that does.
+TEST(Carried, LayersThatAreWeldedBendAsOne) {
+  for (const auto& [lower, upper] :
+       {std::pair<std::size_t, std::size_t>{10, 10}, {10, 20}, {10, 40}, {20, 30}, {20, 33}, {40, 20}}) {
+    EXPECT_NEAR(layered_strip(lower, upper, true), 1, 2e-3) << lower << " " << upper;
+  }
+  EXPECT_NEAR(layered_strip(20, 40, false), 1, 2e-3);
+}
+
+/// A tube of 20 mm, E = 1 MPa, pinched along two lines: its deflection in two layers of 0.5 mm, and by how much that is
+/// said to be too much; in that of one shell of 1 mm on the same mesh.
+std::pair<double, double> layered_tube(std::size_t around, std::size_t of_outer) {
+  const auto layer = [](std::size_t n, double radius, double thickness) {
+    ShellBody body = flat_body(tube_mesh(radius, radius, 20, n, n / 2), 1, 0, thickness);
+    body.curved = true;
+    body.rest = Rest::curved;
+    return body;
+  };
+  const auto pinched = [](Model model) {
+    const double radius = model.shells[0].mesh.vertices[0].head<2>().norm();
+    model.rigid_motions.push_back({0});
+    ForceLoad load;
+    for (const double side : {-1.0, 1.0}) {
+      load.nodes = nodes_of(model, 0, [&](const Vec3& x) { return side * x.x() > radius - eps; });
+      load.total = Vec3(side * 1e-3, 0, 0);
+      model.loads.push_back({0, load, {}});
+    }
+    const State state = last_state(model, linear_run());
+    const std::vector<double> said = element_fields(model, state).layer_error;
+    return std::pair(state.displacement[load.nodes[load.nodes.size() / 2]].x(), *std::ranges::max_element(said));
+  };
+  Model layers, one;
+  layers.shells = {layer(around, 10, 0.5), layer(of_outer, 10.5, 0.5)};
+  layers.attachments.push_back(all_nodes_of(layers, 1, 0));
+  one.shells = {layer(around, 10.25, 1)};
+  const auto [moved, said] = pinched(layers);
+  const auto [right, none] = pinched(one);
+  EXPECT_EQ(none, 0);
+  return {moved / right - 1, said};
+}
+
+/// What layers give way too much, and what is said of it, falls with the square of the mesh.
+TEST(Carried, LayersOfATubeConvergeAndSayHowFarTheyAre) {
+  const auto [coarse, said_coarse] = layered_tube(16, 16);
+  const auto [middle, said_middle] = layered_tube(32, 32);
+  const auto [fine, said_fine] = layered_tube(64, 64);
+  EXPECT_GT(coarse / middle, 3.2);
+  EXPECT_GT(middle / fine, 3.2);
+  EXPECT_LT(fine, 0.012);
+  for (const double share : {said_coarse / coarse, said_middle / middle, said_fine / fine}) {
+    EXPECT_GT(share, 0.9);
+    EXPECT_LT(share, 2.2);
+  }
+  EXPECT_LT(layered_tube(32, 64).first, middle / 3);
+  const Model model = shell_on_shell(true);
+  EXPECT_THAT(doubts_of_layers(model, {0.01, 0.04}), testing::IsEmpty());
+  const std::vector<Warning> found = doubts_of_layers(model, {0.01, said_coarse});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].kind, "coarse layers");
+}
+
+/// A strip in two pieces that meet along a line, end to end or as an angle: as one strip.
+TEST(Carried, AJointAlongALineBearsBending) {
+  for (const bool upright : {false, true}) {
+    for (const std::size_t across : {4, 5}) {
+      Model model;
+      const auto piece = [](std::size_t n, double from) {
+        return flat_body(make_grid(10, n, [&](double u, double v) { return Vec3(from + 20 * u, 8 * v, 0); }).mesh, 1, 0,
+                         1);
+      };
+      model.shells = {piece(4, 0), piece(across, 20)};
+      if (upright) {
+        for (Vec3& x : model.shells[1].mesh.vertices) {
+          x = Vec3(20, x.y(), x.x() - 20);
+        }
+      }
+      const auto end = [&](const Vec3& x) { return (upright ? x.z() : x.x() - 20) > 20 - eps; };
+      Attachment joint;
+      joint.body = 1;
+      joint.to = 0;
+      joint.nodes = nodes_of(model, 1, [&](const Vec3& x) { return x.x() < 20 + eps && x.z() < eps; });
+      model.attachments.push_back(joint);
+      hold(
+          model, [](const Vec3& x) { return x.x() < eps; }, "xyz", "xyz");
+      MomentLoad load;
+      load.nodes = nodes_of(model, 1, end);
+      load.total = Vec3(0, -1e-3, 0);
+      model.loads.push_back({1, load, {}});
+      const State state = last_state(model, linear_run());
+      const double curvature = 1e-3 / (8 / 12.0);
+      const Vec3 moved = state.displacement[model.first_node(1) + load.nodes[0]];
+      const Vec3 exact = upright ? Vec3(-600 * curvature, 0, 200 * curvature) : Vec3(0, 0, 800 * curvature);
+      EXPECT_LT((moved - exact).norm(), 2e-3 * exact.norm()) << upright << " " << across;
+    }
+  }
+}
+
 /// A rotated configuration, put there by hand: carried nodes are exactly in their places, and nothing pulls.
 TEST(Carried, RigidMotionsGiveNoForce) {
-  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
+  for (const Model& model : all_kinds()) {
     const ShellSystem system = make_system(model);
     const Eigen::Quaterniond turn = exponential(Vec3(0.7, -1.1, 0.4));
     Configuration moved = reference_configuration(system);
@@ -201,7 +343,7 @@ TEST(Carried, ABodyThatFloatsIsAsFarBeyondALinearRunAsIsSaid) {
 
 /// What acts on the nodes that are left does the same work, and has the same sum and moment, as before.
 TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
-  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
+  for (const Model& model : all_kinds()) {
     const ShellSystem system = make_system(model);
     Random random(13);
     Configuration moved = reference_configuration(system);
@@ -210,6 +352,9 @@ TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
     VectorX forces = VectorX::Zero(step.size());
     for (const Carried& c : system.carried) {
       forces.segment<3>(first_freedom(c.node)) = random.vector(1);
+      if (c.turns) {
+        forces.segment<3>(first_freedom(c.node) + 3) = random.vector(1);
+      }
     }
     const auto sums = [&](const VectorX& all) {
       Vector6 sum = Vector6::Zero();
@@ -226,7 +371,7 @@ TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
     VectorX condensed = forces;
     condense(system, moved, condensed, nullptr);
     for (const Carried& c : system.carried) {
-      EXPECT_EQ(condensed.segment<3>(first_freedom(c.node)).norm(), 0);
+      EXPECT_EQ(condensed.segment<6>(first_freedom(c.node)).norm(), 0);
     }
     EXPECT_LT((sums(condensed) - sums(forces)).norm(), 1e-12 * forces.norm() * 10);
     // And by virtual work.
@@ -237,19 +382,19 @@ TEST(Carried, CondensedForcesKeepTheirSumAndMoment) {
 
 /// The tangent of what is left, with the curvature of the map under the carried forces.
 TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
-  for (const Model& model : {shell_on_solid(), shell_on_solid(0.3), solid_on_shell()}) {
+  for (const Model& model : all_kinds()) {
     const ShellSystem system = make_system(model);
     Random random(13);
     const Eigen::Index size = first_freedom(system.node_count());
     Configuration at = reference_configuration(system);
-    VectorX away = VectorX::NullaryExpr(size, [&](Eigen::Index) { return random(0.02); });
+    VectorX away = VectorX::NullaryExpr(size, [&](Eigen::Index i) { return random(i % 6 < 3 ? 0.02 : 0.2); });
     for (std::size_t i = system.first_solid_node; i < system.node_count(); ++i) {
       away.segment<2>(first_freedom(i) + 4).setZero();
     }
     advance_configuration(system, away, at);
-    std::vector<char> is_carried(system.node_count(), 0);
+    std::vector<std::size_t> first_unknown(system.node_count(), 0);
     for (const Carried& c : system.carried) {
-      is_carried[c.node] = 1;
+      first_unknown[c.node] = c.turns ? 6 : 3;
     }
     const auto left = [&](const Configuration& where, BlockMatrix* tangent) {
       Forces forces;
@@ -263,7 +408,7 @@ TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
     left(at, &tangent);
     constexpr double step = 1e-6;
     for (std::size_t i = 0; i < system.node_count(); ++i) {
-      for (std::size_t c = is_carried[i] != 0 ? 3 : 0; c < (i < system.first_solid_node ? 6 : 4); ++c) {
+      for (std::size_t c = first_unknown[i]; c < (i < system.first_solid_node ? 6 : 4); ++c) {
         VectorX one = VectorX::Zero(size), column;
         one[first_freedom(i) + static_cast<Eigen::Index>(c)] = 1;
         multiply(tangent, one, column);
@@ -274,6 +419,36 @@ TEST(Carried, TheCondensedTangentIsTheDerivativeOfTheCondensedForces) {
         ASSERT_LT((difference - column).norm(), 2e-7 * column.norm() + 1e-9) << "node " << i << ", component " << c;
       }
     }
+  }
+}
+
+/// What is carried swings with what carries it, and time integration takes and gives no energy.
+TEST(Carried, EnergyIsKeptInMotion) {
+  for (Model model : all_kinds()) {
+    const std::size_t carrier = model.attachments[0].to;
+    const bool is_solid = model.is_solid(carrier);
+    hold_nodes(
+        model, carrier, [&](const Vec3& x) { return is_solid ? x.z() < -1 + eps : x.y() < -2 + eps; }, "xyz");
+    for (ShellBody& body : model.shells) {
+      body.material.density = 1e-9;
+    }
+    for (SolidBody& body : model.solids) {
+      body.material.density = 1e-9;
+    }
+    for (std::size_t b = 0; b < model.body_count(); ++b) {
+      model.loads.push_back({b, GravityLoad{Vec3(0, 300, 300)}, {}});
+    }
+    RunSettings settings;
+    DynamicRun run;
+    run.step = 1e-4;
+    run.duration = 1e-2;
+    run.integrator = Integrator::generalised_alpha;
+    run.spectral_radius = 1;
+    settings.kind = run;
+    const EnergyBalance energy = *solve(model, settings, [](const State&) {}).energy;
+    EXPECT_GT(energy.largest, 0);
+    EXPECT_LT(energy.gained, 0.01);
+    EXPECT_LT(std::abs(energy.lost), 0.01 * energy.largest);
   }
 }
 

@@ -399,19 +399,20 @@ TEST(HoldDoubts, BedsAndPressuresInTheImageAreQuestioned) {
 TEST(HoldDoubts, SuctionNearBucklingIsSaid) {
   const double critical = 2 * 1000 * 0.2 * 0.2 / (100 * std::sqrt(3 * (1 - 0.09)));
   const Model near = pressurised_sphere(3, 0.2, -0.95 * critical);
-  const std::vector<Warning> found = doubts_of_suction(near, nonlinear_run({1}));
+  const std::vector<Warning> found = doubts_of_suction(near, nonlinear_run({1}), {});
   ASSERT_THAT(kinds(found), testing::ElementsAre("near buckling"));
   EXPECT_THAT(found[0].text, HasSubstr(" % of the load at which the perfect shell buckles"));
-  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, -0.1 * critical), nonlinear_run({1})), IsEmpty());
+  EXPECT_THAT(doubts_of_suction(near, nonlinear_run({1}), {{0.5, 1}})[0].text, HasSubstr("is 200 % of"));
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, -0.1 * critical), nonlinear_run({1}), {}), IsEmpty());
   RunSettings by_cg = nonlinear_run({1});
   by_cg.solver = Solver::cg;
-  EXPECT_THAT(kinds(doubts_of_suction(near, by_cg)), testing::ElementsAre("near buckling"));
-  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, critical), nonlinear_run({1})), IsEmpty());
+  EXPECT_THAT(kinds(doubts_of_suction(near, by_cg, {})), testing::ElementsAre("near buckling"));
+  EXPECT_THAT(doubts_of_suction(pressurised_sphere(3, 0.2, critical), nonlinear_run({1}), {}), IsEmpty());
   // The load grows from the pressure of the image on; what buckles the wall is the suction itself.
   const auto percent = [&](double imaged, double suction) {
     Model model = pressurised_sphere(3, 0.2, -suction * critical);
     std::get<PressureLoad>(model.loads[0].kind).imaged_at = imaged * critical;
-    const std::vector<Warning> said = doubts_of_suction(model, nonlinear_run({1}));
+    const std::vector<Warning> said = doubts_of_suction(model, nonlinear_run({1}), {});
     return said.empty() ? 0 : std::stod(said[0].text.substr(said[0].text.find(" is ") + 4));
   };
   EXPECT_EQ(percent(5, 0.05), 0);

@@ -25,8 +25,9 @@ class ContactWork {
 public:
   explicit ContactWork(const ShellSystem& system);
 
-  /// Forces at the end of a step, which are those at the start of the next; of size zero: nothing may touch.
-  void keep(const VectorX& forces, const FreeMask& free);
+  /// Forces at the end of a step on what moves, which are those at the start of the next; of size zero: nothing may
+  /// touch.
+  void keep(VectorX forces);
 
   struct Work {
     double brought = 0, damped = 0;  ///< mJ

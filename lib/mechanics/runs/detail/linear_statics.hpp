@@ -23,6 +23,15 @@ public:
   /// Errors: RequirementError: not positive definite; digits are missing.
   LinearSolution solve(const std::vector<double>& factors, const VectorX& prescribed);
 
+  /// By how much the theory of large rotations moves less, more or aside than a linear solution, relative to what that
+  /// gives; of prescribed motion, by how much its forces differ. From the path's expansion about the reference, to the
+  /// third order, with the wall free to relax in the second by the tangent under the load: a bed may be far softer than
+  /// what tension turns back. 1 at least where the path has a limit load or buckles before. Source: Koiter 1945, "Over
+  /// de stabiliteit van het elastisch evenwicht"; Haftka, Mallett, Nachbar 1971, "Adaption of Koiter's method to finite
+  /// element analysis of snap-through buckling behavior". Cost: a factorisation in place of that of the stiffness, two
+  /// to eight solves, four evaluations of the forces each. Limits: an order of magnitude where it passes 1.
+  double departure(ShellSystem& system, const LinearSolution& solution, const std::vector<double>& factors);
+
   /// What is left out of balance, of the forces.
   [[nodiscard]] double residual(const LinearSolution& solution) const;
   [[nodiscard]] std::size_t freedom_count() const { return solver_.freedom_count(); }
@@ -38,16 +47,6 @@ private:
   BlockMatrix matrix_;
   bool factored_ = false;
 };
-
-/// By how much the theory of large rotations moves less, more or aside than a linear solution, relative to what that
-/// gives; of prescribed motion, by how much its forces differ. From the path's expansion about the reference, to the
-/// third order, with the wall free to relax in the second by the tangent under the load: a bed may be far softer than
-/// what tension turns back. 1 at least where the path has a limit load or buckles before. Source: Koiter 1945, "Over de
-/// stabiliteit van het elastisch evenwicht"; Haftka, Mallett, Nachbar 1971, "Adaption of Koiter's method to finite
-/// element analysis of snap-through buckling behavior". Cost: two to eight solves, four evaluations of the forces each.
-/// Limits: an order of magnitude where it passes 1.
-double linear_departure(ShellSystem& system, const RunSettings& settings, const LinearSolution& solution,
-                        const std::vector<double>& factors);
 
 /// The tangent at the reference with the stress of a linear solution, under the loads: of linear buckling, which leaves
 /// out that the solution moves the shell. Cost: linear.
