@@ -225,16 +225,19 @@ private:
 };
 
 /// A target that cannot be what the shells were fitted to: no finer than they are, or somewhere else.
-/// @param needed  else, where it is hardly finer, it is left out with a warning
+/// What a target is for: an accuracy that has to be reached, one that is aimed at, or an estimate by one refinement.
+/// All but the first do without one that is hardly finer than the shells, with a warning.
+enum class Need { must, aim, estimate };
+
 /// @return whether it can be used
-bool require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path, bool needed,
+bool require_own_target(const ShellMesh& shell, const Target& target, const fs::path& path, Need need,
                         const Context& context) {
   constexpr std::size_t facets_per_shell = 2;
   constexpr double farthest_mean = 0.02;       // of the diagonal
   constexpr double farthest_of_shells = 0.25;  // of the root of their mean area: a few follow a surface no better
   const std::size_t facets = target.mesh().triangles.size();
   const bool is_finer = facets >= facets_per_shell * shell.triangles.size();
-  if (!is_finer && needed) {
+  if (!is_finer && need == Need::must) {
     throw InputError(fmt::format(
         "{}: has {} triangles, and the shells are {}: name the fine surface that they were fitted to; where "
         "there is none finer, take fewer shells (SHELLS={})",
@@ -249,7 +252,12 @@ bool require_own_target(const ShellMesh& shell, const Target& target, const fs::
                     "surface that they were fitted to",
                     path.string(), mean, 100 * mean / target.diagonal()));
   }
-  if (!is_finer) {
+  if (!is_finer && need == Need::aim) {
+    context.warn({Weight::minor, "no target",
+                  fmt::format("{}: has {} triangles, too few to fit more than these {} shells to it: finer ones lie on "
+                              "the shells' own patches, and the error of the geometry is not seen",
+                              path.string(), facets, shell.triangles.size())});
+  } else if (!is_finer) {
     context.warn(
         {Weight::minor, "error of the mesh",
          fmt::format("{}: has {} triangles, too few to fit four times the {} shells to it: how far the answers "
@@ -261,7 +269,7 @@ bool require_own_target(const ShellMesh& shell, const Target& target, const fs::
 }
 
 /// Reads the target of a body, which then faces as its shells do; null where it cannot be used.
-std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& mesh, const fs::path& path, bool needed,
+std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& mesh, const fs::path& path, Need need,
                                     LoadedRun& loaded, const Context& context) {
   MeshFile file = read_mesh(path, shell.unit_mm, true);
   if (const auto note = unit_note(file, path, shell.unit_mm)) {
@@ -292,7 +300,7 @@ std::unique_ptr<Target> read_target(const SceneShell& shell, const ShellMesh& me
                               path.string())});
     target = std::make_unique<Target>(turned_around(target->mesh()));
   }
-  if (!require_own_target(mesh, *target, path, needed, context)) {
+  if (!require_own_target(mesh, *target, path, need, context)) {
     target.reset();
   }
   return target;
@@ -315,8 +323,8 @@ void read_targets(const SimulateSettings& settings, LoadedRun& loaded, const Con
     const std::size_t b = found - scene.shells.begin();
     loaded.inputs.push_back(path);
     context.reads(path);
-    loaded.targets[b] =
-        read_target(*found, loaded.model.shells[b].mesh, path, scene.accuracy.has_value(), loaded, context);
+    const Need need = !scene.accuracy ? Need::estimate : settings.max_seconds ? Need::aim : Need::must;
+    loaded.targets[b] = read_target(*found, loaded.model.shells[b].mesh, path, need, loaded, context);
   }
 }
 
@@ -620,7 +628,7 @@ void tell(const Model& model, const SimulateSettings& settings, const Recorder& 
     context.warn(*recorded.crossing());
   }
   // Sentences that name their places themselves.
-  std::ranges::for_each(doubts_of_solids(model, last.solid_error), context.warn);
+  std::ranges::for_each(doubts_of_solids(model, last.solid_error, last.roughness), context.warn);
   std::ranges::for_each(doubts_of_layers(model, last.layer_error), context.warn);
   std::ranges::for_each(swings_of(model, recorded.ended), context.warn);
   std::ranges::for_each(doubts_of_suction(model, settings.scene.run, record.summary->snaps), context.warn);
@@ -681,7 +689,8 @@ LoadedRun load_run(const SimulateSettings& settings, const Context& context) {
   read_targets(settings, loaded, context);
   std::ranges::for_each(read.warnings, context.warn);
   for (std::size_t b = 0; scene.accuracy && b < loaded.targets.size(); ++b) {
-    if (!loaded.targets[b] && loaded.model.shells[b].curved && !loaded.on_own_patches) {
+    const bool is_named = scene.accuracy->targets.contains(scene.shells[b].name);
+    if (!is_named && loaded.model.shells[b].curved && !loaded.on_own_patches) {
       context.warn({Weight::minor, "no target",
                     fmt::format("{}: has no target: finer shells lie on its own patches, and the error of its geometry "
                                 "is not seen (--target, or target in [accuracy])",
@@ -763,14 +772,15 @@ void simulate(SimulateSettings settings, LoadedRun loaded, RunRecord& record, co
     const auto states = recorded.pictured.states({state, fields, when(scene.run, state)});
     write_file(*settings.picture, result_picture(model, states, look), context.overwrite);
   }
-  recorded.commit(record.converged);
-  if (journal) {
-    journal->remove();
-  }
   if (is_modes(scene.run)) {
     tell_modes(*record.summary, scene.run, subject, context);
   } else {
     tell(model, settings, recorded, record, context);
+  }
+  // Last: a run that is killed before can be resumed, and after it only the report is left to write.
+  recorded.commit(record.converged);
+  if (journal) {
+    journal->remove();
   }
 }
 

@@ -30,6 +30,7 @@ constexpr std::array shown_measures{Shown{"shells", "shells"},
                                     Shown{"distance_percent", "distance %"},
                                     Shown{"membrane_p99_kpa", "membrane kPa"},
                                     Shown{"membrane_error_percent", "+- %", "membrane_p99_mpa"},
+                                    Shown{"membrane_mean_kpa", "mean kPa"},
                                     Shown{"stress_p99_kpa", "faces kPa"},
                                     Shown{"stress_error_percent", "+- %", "stress_p99_mpa"},
                                     Shown{"max_displacement_mm", "displ. mm"},
@@ -114,9 +115,10 @@ std::string meanings(const std::vector<PipelineCase>& cases) {
   std::string text;
   if (any("stress_p99_kpa")) {
     text +=
-        "membrane: von Mises stress, mean over the wall, faces: at either face, strain: largest principal, all the "
-        "99th "
-        "percentile by area; displ.: the largest, since the image; of a motion all are those at its end\n";
+        "membrane: von Mises stress of the middle of the wall, faces: at either face, strain: largest principal, all "
+        "the "
+        "99th percentile by area; mean: of the membrane stress over the area; displ.: the largest, since the image; of "
+        "a motion all are those at its end\n";
   }
   if (any("membrane_error_percent") || any("stress_error_percent") || any("displacement_error_percent")) {
     text += "+-: estimated error of the number before it, by number of shells and model; ?: not credible\n";

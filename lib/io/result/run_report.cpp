@@ -207,12 +207,16 @@ void RunRecord::take(const Model& model, const State& state, const ElementFields
   if (is_motion && (!peak || peak->displacement < fields.largest_displacement)) {
     peak = {fields.largest_displacement, state.time};
   }
+  const double energy = std::abs(state.strain_energy);
+  const bool is_most = !last || energy >= last->most_strain_energy;
   last = {fields.wall,
           fields.largest_displacement,
           fields.displacement_p99,
           fields.solid_strain_p99,
-          fields.solid_error,
-          fields.layer_error,
+          is_most ? fields.solid_error : last->solid_error,
+          is_most ? fields.layer_error : last->layer_error,
+          is_most ? fields.roughness : last->roughness,
+          is_most ? energy : last->most_strain_energy,
           count_unresolved(model, state, most_bending),
           peak};
   if (!volume_before) {

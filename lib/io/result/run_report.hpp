@@ -26,10 +26,11 @@ struct LastState {
   double largest_displacement = 0;  ///< mm
   double displacement_p99 = 0;      ///< mm, as in ElementFields
   double solid_strain_p99 = 0;      ///< as in ElementFields
-  std::vector<double> solid_error;  ///< as in ElementFields, as is the next
-  std::vector<double> layer_error;
-  std::size_t unresolved = 0;  ///< count_unresolved()
-  std::optional<Peak> peak{};  ///< of a motion, so far
+  /// As in ElementFields, of the state with the most strain energy.
+  std::vector<double> solid_error, layer_error, roughness;
+  double most_strain_energy = 0;  ///< mJ, of that state
+  std::size_t unresolved = 0;     ///< count_unresolved()
+  std::optional<Peak> peak{};     ///< of a motion, so far
 };
 
 /// Something of a model from state to state.

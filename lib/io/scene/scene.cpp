@@ -4,6 +4,7 @@
 #include "tunica/io/mesh/surface_doubts.hpp"
 #include "tunica/io/scene/detail/body_files.hpp"
 #include "tunica/io/scene/detail/scene_names.hpp"
+#include "tunica/surface/distance/closest_point.hpp"
 #include "tunica/surface/mesh/measure.hpp"
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <set>
 
 namespace tunica {
 namespace {
@@ -295,13 +297,52 @@ void warn_of_small_region(const Model& model, std::size_t body, const std::vecto
   }
 }
 
-/// A solid lets the nodes that it carries turn: those of no whole triangle are a hinge, along a rim as along a line.
-void warn_of_hinge(const Model& model, const Attachment& attachment, std::vector<Warning>& warnings) {
-  if (model.is_solid(attachment.body) || !model.is_solid(attachment.to) || attachment.nodes.size() < 2) {
+/// Whether most of the line that attached nodes make lies within triangles of a shell, away from their edges.
+bool lies_within(const TriangleMesh& facets, const ShellMesh& carried, const std::vector<Index>& nodes) {
+  constexpr double on_edge = 0.1;  // of the height over it; a middle may lie on a diagonal
+  const std::set<Index> attached(nodes.begin(), nodes.end());
+  const ClosestPoint closest(facets);
+  std::size_t sides = 0, within = 0;
+  for (const auto& triangle : carried.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = triangle[k], b = triangle[(k + 1) % 3];
+      if (!attached.contains(a) || !attached.contains(b)) {
+        continue;
+      }
+      const ClosestPoint::Hit hit = closest.closest(0.7 * carried.vertices[a] + 0.3 * carried.vertices[b]);
+      const auto& [x, y, z] = facets.triangles[hit.triangle];
+      const Vec3 corners[3] = {facets.vertices[x], facets.vertices[y], facets.vertices[z]};
+      double least = infinity;
+      for (std::size_t l = 0; l < 3; ++l) {
+        least = std::min(least, triangle_area(corners[l], corners[(l + 1) % 3], hit.point));
+      }
+      ++sides;
+      within += least > on_edge * triangle_area(corners[0], corners[1], corners[2]) ? 1 : 0;
+    }
+  }
+  return 2 * within > sides;
+}
+
+/// Of nodes that make no whole triangle, along a rim or a line. A solid lets them turn, so that they are a hinge; a
+/// shell bends along its edges, not within.
+void warn_of_joint(const Model& model, const Attachment& attachment, std::vector<Warning>& warnings) {
+  if (model.is_solid(attachment.body) || attachment.nodes.size() < 2) {
     return;
   }
   const std::vector<double> whole = whole_triangles(model.shells[attachment.body].mesh.triangles, attachment.nodes);
-  if (std::ranges::all_of(whole, [](double share) { return share == 0; })) {
+  if (std::ranges::any_of(whole, [](double share) { return share != 0; })) {
+    return;
+  }
+  if (!model.is_solid(attachment.to)) {
+    const TriangleMesh facets = flat_facets(model.shells[attachment.to].mesh);
+    if (lies_within(facets, model.shells[attachment.body].mesh, attachment.nodes)) {
+      warnings.push_back({Weight::note, "joint within shells",
+                          fmt::format("{}: the nodes that are carried lie along a line within shells of {}, which do "
+                                      "not bend there: the joint is too stiff by what bends over a length like theirs; "
+                                      "let nodes of {} lie along the line, or take finer shells there",
+                                      attachment.said_at, model.name_of(attachment.to), model.name_of(attachment.to))});
+    }
+  } else {
     warnings.push_back(
         {Weight::major, "hinge",
          fmt::format("{}: the nodes that are carried lie along a line, and a solid lets them turn: the joint "
@@ -340,7 +381,7 @@ LoadedScene load_scene(const Scene& scene) {
     }
   }
   for (const Attachment& attachment : loaded.model.attachments) {
-    warn_of_hinge(loaded.model, attachment, loaded.warnings);
+    warn_of_joint(loaded.model, attachment, loaded.warnings);
   }
   std::vector<bool> is_looked_at(loaded.model.shells.size(), false);
   for (const Load& load : loaded.model.loads) {

@@ -180,12 +180,12 @@ private:
   std::array<Vec3, 3> sine_;
 };
 
-/// The normal of a triangle of points, and how it turns with them.
+/// The normal of a triangle of points, and how it turns with them; points 1 and 2 count from point 0.
 class FacetNormal {
 public:
-  FacetNormal(const std::vector<Index>& nodes, const std::vector<Vec3>& reference, const Configuration& configuration) {
-    const auto place = [&](std::size_t k) { return Vec3(reference[nodes[k]] + configuration.displacement[nodes[k]]); };
-    const Vec3 first = place(1) - place(0), second = place(2) - place(0);
+  FacetNormal(const std::vector<Index>& nodes, const std::vector<Vec3>& reference, const Configuration& configuration)
+      : FacetNormal(between(nodes, 1, reference, configuration), between(nodes, 2, reference, configuration)) {}
+  FacetNormal(const Vec3& first, const Vec3& second) {
     const Vec3 twice = first.cross(second);
     length_ = twice.norm();
     normal_ = twice / length_;
@@ -208,10 +208,105 @@ public:
   }
 
 private:
+  static Vec3 between(const std::vector<Index>& nodes, std::size_t k, const std::vector<Vec3>& reference,
+                      const Configuration& configuration) {
+    return reference[nodes[k]] - reference[nodes[0]] + configuration.displacement[nodes[k]] -
+           configuration.displacement[nodes[0]];
+  }
+
   double length_ = 0;
   Vec3 normal_;
   Mat3 across_;
   std::array<Mat3, 3> of_points_;  // derivatives of twice the area's vector
+};
+
+/// How the surface of a shell's face is turned in a point. The patch says how its normal n is, as it says where it is:
+/// a moment on the mean of the nodes' rotations would bend a shell from within four times less than one on its normal.
+/// About the normal it is a tangent e, turned by that mean and laid into the surface, that says it: e1 = e - s n, s =
+/// e.n (normalised), e2 = n x e1. Spin: n x dn + n (n - k e1).mean - k n e2.dn, where k = s / (e.e1).
+class SurfaceRotation {
+public:
+  using Matrix3x18 = Eigen::Matrix<double, 3, 18>;
+
+  SurfaceRotation(const Carried& c, const PatchMap& map, const Configuration& configuration)
+      : carried_(c),
+        map_(map),
+        mean_(c, configuration),
+        normal_(map.from_origin(c.slopes[0]), map.from_origin(c.slopes[1])),
+        n_(normal_.normal()),
+        e_(mean_.rotation() * Vec3(c.frame.col(0))),
+        e1_((e_ - n_.dot(e_) * n_).normalized()),
+        e2_(n_.cross(e1_)),
+        cosine_(e1_.dot(e_)),
+        k_(n_.dot(e_) / cosine_) {
+    Mat3 frame;
+    frame << e1_, e2_, n_;
+    rotation_ = frame * c.frame.transpose();
+    by_normal_ = skew(n_) - k_ * n_ * e2_.transpose();
+    by_mean_ = n_ * (n_ - k_ * e1_).transpose();
+  }
+
+  [[nodiscard]] const Mat3& rotation() const { return rotation_; }
+
+  /// Its spin by the nodes' displacements and spins. @pre the map is linearised, here and below
+  [[nodiscard]] Matrix3x18 derivative() const { return by_normal_ * of_normal() + by_mean_ * of_mean(); }
+
+  /// Of the forces and moments of the nodes under a moment, by the nodes' displacements and spins.
+  [[nodiscard]] Matrix18 second_derivative(const Vec3& moment) const {
+    const double about = moment.dot(n_);
+    const Vec3 on_normal = moment.cross(n_) - about * k_ * e2_, on_mean = about * (n_ - k_ * e1_);
+    const Matrix3x18 normal = of_normal(), mean = of_mean(), spin = derivative();
+    // Of k, by the normal and the spins that the tangents see.
+    const Eigen::Matrix<double, 1, 18> of_k =
+        (e_.transpose() * normal + e_.cross(n_).transpose() * mean -
+         k_ * (e1_.cross(e_).transpose() * spin + e_.cross(e1_).transpose() * mean)) /
+        cosine_;
+    const Eigen::Matrix<double, 1, 18> of_about = moment.transpose() * normal;
+    const Matrix3x18 of_on_normal =
+        skew(moment) * normal - e2_ * (k_ * of_about + about * of_k) + about * k_ * skew(e2_) * spin;
+    const Matrix3x18 of_on_mean = (n_ - k_ * e1_) * of_about + about * (normal - e1_ * of_k + k_ * skew(e1_) * spin);
+    Matrix18 result = normal.transpose() * of_on_normal + mean.transpose() * of_on_mean;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        result.block<3, 3>(6 * i + 3, 6 * j + 3) += mean_.second_derivative(on_mean, i, j);
+      }
+    }
+    PatchMap::Points forces = PatchMap::Points::Zero();
+    PatchMap::Matrix27 of_points = PatchMap::Matrix27::Zero();
+    for (std::size_t a = 0; a < 2; ++a) {
+      forces += normal_.derivative(a + 1).transpose() * on_normal * carried_.slopes[a].transpose();
+      for (std::size_t b = 0; b < 2; ++b) {
+        const Mat3 second = normal_.second_derivative(on_normal, a + 1, b + 1);
+        for (int i = 0; i < 9; ++i) {
+          for (int j = 0; j < 9; ++j) {
+            of_points.block<3, 3>(3 * i, 3 * j) += carried_.slopes[a][i] * carried_.slopes[b][j] * second;
+          }
+        }
+      }
+    }
+    return result + map_.stiffness(of_points, forces);
+  }
+
+private:
+  [[nodiscard]] Matrix3x18 of_normal() const {
+    return normal_.derivative(1) * map_.derivative(carried_.slopes[0]) +
+           normal_.derivative(2) * map_.derivative(carried_.slopes[1]);
+  }
+  [[nodiscard]] Matrix3x18 of_mean() const {
+    Matrix3x18 result = Matrix3x18::Zero();
+    for (int k = 0; k < 3; ++k) {
+      result.block<3, 3>(0, 6 * k + 3) = mean_.derivative(k);
+    }
+    return result;
+  }
+
+  const Carried& carried_;
+  const PatchMap& map_;
+  MeanRotation mean_;
+  FacetNormal normal_;
+  Vec3 n_, e_, e1_, e2_;
+  double cosine_, k_;
+  Mat3 rotation_, by_normal_, by_mean_;
 };
 
 /// By 6 per carrier: of x, and of the spin where it turns.
@@ -236,14 +331,11 @@ Derivative derivative(const Carried& c, const Surfaces& surfaces, const std::vec
   PatchMap map(surfaces.faces[c.face], reference, configuration);
   map.linearise();
   result.topRows<3>() = map.derivative(c.weights);
-  const MeanRotation mean(c, configuration);
-  const Mat3 lever = skew(mean.rotation() * c.offset);
-  for (int k = 0; k < 3; ++k) {
-    const Mat3 spin = mean.derivative(k);
-    result.block<3, 3>(0, 6 * k + 3) -= lever * spin;
-    if (c.turns) {
-      result.block<3, 3>(3, 6 * k + 3) = spin;
-    }
+  const SurfaceRotation surface(c, map, configuration);
+  const SurfaceRotation::Matrix3x18 spin = surface.derivative();
+  result.topRows<3>() -= skew(surface.rotation() * c.offset) * spin;
+  if (c.turns) {
+    result.bottomRows<3>() = spin;
   }
   return result;
 }
@@ -297,7 +389,13 @@ std::vector<Carried> carried_nodes(const Model& model, const Surfaces& surfaces,
         c.weights = patch_weights(on, b);
         c.shares << 1 - b[0] - b[1], b[0], b[1], 0;
         c.carriers.assign(on.nodes.begin(), on.nodes.end());
-        c.offset = x - PatchMap(on, reference, rest).point(c.weights);
+        const PatchMap map(on, reference, rest);
+        c.offset = x - map.point(c.weights);
+        c.foot = map.from_origin(c.weights);
+        c.slopes = patch_weight_derivatives(on, b);
+        const Vec3 along = map.from_origin(c.slopes[0]).normalized();
+        const Vec3 normal = along.cross(map.from_origin(c.slopes[1])).normalized();
+        c.frame << along, normal.cross(along), normal;
         c.turns = !model.is_solid(attachment.body);
         double longest = 0;
         for (int k = 0; k < 3; ++k) {
@@ -355,11 +453,11 @@ void place_carried(const std::vector<Carried>& carried, const Surfaces& surfaces
                            FacetNormal(c->carriers, reference, Configuration::at_rest(reference.size())).normal());
       }
     } else {
-      u = PatchMap(surfaces.faces[c->face], reference, configuration).point(c->weights) - reference[c->node];
-      const Eigen::Quaterniond rotation = MeanRotation(*c, configuration).rotation();
-      u += rotation * c->offset;
+      const PatchMap map(surfaces.faces[c->face], reference, configuration);
+      const Mat3 rotation = SurfaceRotation(*c, map, configuration).rotation();
+      u = map.from_origin(c->weights) - c->foot + rotation * c->offset - c->offset;
       if (c->turns) {
-        configuration.rotation[c->node] = rotation;
+        configuration.rotation[c->node] = Eigen::Quaterniond(rotation).normalized();
       }
     }
     configuration.displacement[c->node] = u;
@@ -448,17 +546,17 @@ void condense(const std::vector<Carried>& carried, const Surfaces& surfaces, con
     }
     PatchMap map(surfaces.faces[c.face], reference, configuration);
     map.linearise();
-    const Matrix18 curvature = map.stiffness(PatchMap::Matrix27::Zero(), force * c.weights.transpose());
-    const MeanRotation mean(c, configuration);
-    const Vec3 d = mean.rotation() * c.offset;
+    const SurfaceRotation surface(c, map, configuration);
+    const SurfaceRotation::Matrix3x18 spin = surface.derivative();
+    const Vec3 d = surface.rotation() * c.offset;
     const Vec3 moment = d.cross(force) + (c.turns ? Vec3(load.tail<3>()) : Vec3(Vec3::Zero()));
     const Mat3 by_spin = d * force.transpose() - d.dot(force) * Mat3::Identity();  // d turns with it
+    const Matrix18 curvature = map.stiffness(PatchMap::Matrix27::Zero(), force * c.weights.transpose()) +
+                               surface.second_derivative(moment) + spin.transpose() * by_spin * spin;
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
-        auto block = tangent->block(tangent->find(c.carriers[row], c.carriers[column]));
-        block += curvature.block<6, 6>(6 * row, 6 * column);
-        block.block<3, 3>(3, 3) += mean.derivative(row).transpose() * by_spin * mean.derivative(column) +
-                                   mean.second_derivative(moment, row, column);
+        tangent->block(tangent->find(c.carriers[row], c.carriers[column])) +=
+            curvature.block<6, 6>(6 * row, 6 * column);
       }
     }
   }

@@ -111,17 +111,21 @@ std::array<PatchWeights, 2> patch_weight_derivatives(const SurfaceFace& face, co
 
 PatchMap::PatchMap(const SurfaceFace& face, const std::vector<Vec3>& reference, const Configuration& configuration)
     : face_(&face) {
-  points_.setZero();
+  local_.setZero();
+  const Vec3& origin = reference[face.nodes[0]];
   for (int k = 0; k < 3; ++k) {
-    points_.col(k) = reference[face.nodes[k]] + configuration.displacement[face.nodes[k]];
+    local_.col(k) = reference[face.nodes[k]] - origin + configuration.displacement[face.nodes[k]];
     turns_[k] = configuration.rotation[face.nodes[k]];
   }
   for (int k = 0; face.curved && k < 6; ++k) {
     const EdgePoint p = edge_point(k);
     const auto [alpha, beta, gamma] =
         edge_factors(p.mean.dot(p.edge), p.difference.dot(p.edge), p.edge.squaredNorm(), p.difference.squaredNorm());
-    points_.col(3 + k) = points_.col(p.here) + alpha * p.edge - beta * p.mean - gamma * p.difference;
+    local_.col(3 + k) = local_.col(p.here) + alpha * p.edge - beta * p.mean - gamma * p.difference;
   }
+  points_.setZero();
+  const int count = face.curved ? 9 : 3;
+  points_.leftCols(count) = local_.leftCols(count).colwise() + origin;
 }
 
 PatchMap::EdgePoint PatchMap::edge_point(int k) const {
@@ -129,7 +133,7 @@ PatchMap::EdgePoint PatchMap::edge_point(int k) const {
   EdgePoint p;
   p.here = k % 2 == 0 ? edge : next_of(edge);
   p.there = k % 2 == 0 ? next_of(edge) : edge;
-  p.edge = points_.col(p.there) - points_.col(p.here);
+  p.edge = local_.col(p.there) - local_.col(p.here);
   const Vec3& own = face_->normals[p.here];
   const Vec3& other = face_->across[edge][k % 2];
   p.mean = turns_[p.here] * (own + other).normalized();

@@ -52,6 +52,10 @@ public:
   [[nodiscard]] Vec3 point(const PatchWeights& weights) const { return points_ * weights; }
   [[nodiscard]] const Points& points() const { return points_; }
 
+  /// By weights, counted from the first node in the reference: to the digits of displacements and of the face, not of
+  /// positions. Of weights that sum up to zero it is a tangent.
+  [[nodiscard]] Vec3 from_origin(const PatchWeights& weights) const { return local_ * weights; }
+
   /// Makes the derivatives, which the functions below need.
   void linearise();
 
@@ -94,6 +98,7 @@ private:
   [[nodiscard]] EdgePoint edge_point(int k) const;
 
   const SurfaceFace* face_;
+  Points local_;  ///< from the first node in the reference
   Points points_;
   std::array<Eigen::Quaterniond, 3> turns_;
   std::unique_ptr<Linear> linear_;

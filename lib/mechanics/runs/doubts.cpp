@@ -160,18 +160,25 @@ void doubt_overlaps(const ShellBody& body, std::vector<Warning>& found) {
   }
 }
 
-void doubt_material(const std::string& where, const Material& material, bool pressed, std::vector<Warning>& found) {
+/// What a body may be, by what else is known of it.
+enum class Kind { organ, inflated, any };
+
+void doubt_material(const std::string& where, const Material& material, Kind kind, std::vector<Warning>& found) {
   // MPa. Fat and brain reach down to a few hundred Pa; tungsten, the stiffest metal, has 410 GPa; the walls of
-  // balloons, the stiffest that pressure is put on from inside, some GPa.
+  // balloons, the stiffest that pressure is put on from inside, some GPa; arteries and tendon-like sheets up to some
+  // hundred MPa.
   constexpr std::array<double, 2> of_tissue{1e-3, 100};
-  constexpr double softest = 1e-4, stiffest = 5e5, stiffest_pressed = 1e4;
+  constexpr double softest = 1e-4, stiffest = 5e5, stiffest_inflated = 1e4, stiffest_organ = 1e3;
   const bool soft = material.young < softest;
-  if (soft || material.young > (pressed ? stiffest_pressed : stiffest)) {
+  if (soft || material.young > (kind == Kind::any     ? stiffest
+                                : kind == Kind::organ ? stiffest_organ
+                                                      : stiffest_inflated)) {
     found.push_back({Weight::major, "stiffness",
                      fmt::format("{}: its Young's modulus, {}, is {}{}", where, pressure_text(material.young),
-                                 soft      ? "less than that of any tissue"
-                                 : pressed ? "more than that of any wall that is inflated"
-                                           : "more than that of any metal",
+                                 soft                     ? "less than that of any tissue"
+                                 : kind == Kind::organ    ? "more than that of any hollow organ"
+                                 : kind == Kind::inflated ? "more than that of any wall that is inflated"
+                                                          : "more than that of any metal",
                                  meant(material.young, {1e3, 1e6, 1e-3, 1e-6}, of_tissue, pressure_text))});
   }
   // kg / m^3. Lungs with air have 200, tissue about 1,050, platinum 21,500.
@@ -212,18 +219,27 @@ void doubt_voxels(const ShellBody& body, std::vector<Warning>& found) {
   // A surface goes through slices that are thick against its pixels in steps of up to half a slice; voxels that are
   // about as long as wide are smoothed to a fraction of that.
   constexpr double anisotropic = 2;
+  constexpr double thinnest = 0.01;  // of a voxel
   const auto [shortest, longest] = *body.voxel;
   const double wall = *std::min_element(body.thickness.begin(), body.thickness.end());
+  const auto millimetres = [](double mm) { return fmt::format("{:.3g} mm", mm); };
+  if (wall < thinnest * shortest) {
+    found.push_back({Weight::major, "thin wall",
+                     fmt::format("{}: its thickness, {}, is less than a hundredth of the voxels of its image, {}{}",
+                                 named(body.said_at, body.name), millimetres(wall), millimetres(shortest),
+                                 meant(wall, {1e3, 10}, {shortest / 20, 100 * longest}, millimetres))});
+    return;
+  }
   const bool slices = longest >= anisotropic * shortest;
   if (longest > wall) {
     found.push_back(
         {Weight::minor, "large voxels",
-         fmt::format("{}: the {} of its image, {:.3g} mm, leave the surface uncertain by up to {:.3g} mm, "
-                     "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles may be "
-                     "too high by 10 % (membrane), and at the faces be two to three times those of a smooth organ; go "
-                     "by the mean membrane stress, or take a finer image",
-                     named(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2,
-                     longest / 2 / wall)});
+         fmt::format(
+             "{}: the {} of its image, {:.3g} mm, leave the surface uncertain by up to {:.3g} mm, "
+             "{:.2g} times the wall: what is left of its steps bends the wall; 99th percentiles may be "
+             "too high by 10 to 20 % (membrane), and at the faces be two to three times those of a smooth organ; go "
+             "by the mean membrane stress, or take a finer image",
+             named(body.said_at, body.name), slices ? "slices" : "voxels", longest, longest / 2, longest / 2 / wall)});
   } else if (longest > wall / 2) {
     found.push_back(
         {Weight::note, "large voxels",
@@ -542,7 +558,8 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
     if (found.size() == before) {
       doubt_overlaps(body, found);
     }
-    doubt_material(named(body.said_at, body.name), body.material, is_pressed(model, b), found);
+    const Kind kind = !is_pressed(model, b) ? Kind::any : body.voxel ? Kind::organ : Kind::inflated;
+    doubt_material(named(body.said_at, body.name), body.material, kind, found);
     doubt_voxels(body, found);
     if (!has_estimates) {
       doubt_coarseness(body, std::holds_alternative<FrequencyRun>(settings.kind), found);
@@ -555,7 +572,7 @@ std::vector<Warning> doubts(const Model& model, const RunSettings& settings, boo
   }
   for (std::size_t b = model.shells.size(); b < model.body_count(); ++b) {
     const SolidBody& solid = model.solids[b - model.shells.size()];
-    doubt_material(named(solid.said_at, solid.name), solid.material, false, found);
+    doubt_material(named(solid.said_at, solid.name), solid.material, Kind::any, found);
     held.push_back(held_freedoms(model, b));
   }
   doubt_loads(model, settings, held, found);
@@ -592,9 +609,12 @@ double mean_edge(const std::vector<Vec3>& vertices, const std::vector<std::array
 }
 
 /// A shell on a solid whose tetrahedra are smaller than its triangles: its nodes press dents between which nothing
-/// does.
-std::optional<Warning> doubt_of_coarse_skin(const Model& model, std::size_t solid) {
-  constexpr double much_finer = 0.75;
+/// does. One whose triangles are the smaller ones bends at the edges of the flat faces, and what bends there is its
+/// own.
+std::optional<Warning> doubt_of_skin(const Model& model, std::size_t solid, const std::vector<double>& roughness) {
+  constexpr double much_finer = 0.75, notable = 0.02, large = 0.2;
+  // Of skins two to four times as fine as the faces.
+  constexpr double most_of_estimate = 2.5, largest_loss = 0.95;
   const std::size_t body = model.shells.size() + solid;
   const TetMesh& mesh = model.solids[solid].mesh;
   for (const Attachment& attachment : model.attachments) {
@@ -612,22 +632,34 @@ std::optional<Warning> doubt_of_coarse_skin(const Model& model, std::size_t soli
                                  named(model.solids[solid].said_at, model.solids[solid].name), skin.name, carried,
                                  carries, carried, skin.name)};
     }
+    if (const double share = roughness[attachment.body]; carried < much_finer * carries && share > notable) {
+      return Warning{
+          share > large ? Weight::major : Weight::minor, "fine skin",
+          fmt::format("{}: carries {}, whose edges of {:.3g} mm are shorter than those of its faces, {:.3g} "
+                      "mm: that shell bends where flat faces meet, and what there is may be too stiff, "
+                      "so that it gives way by {:.0f} to {:.0f} % too little; attach the solid to the shell "
+                      "instead, or take a mesh of {} as coarse as the faces",
+                      named(model.solids[solid].said_at, model.solids[solid].name), skin.name, carried, carries,
+                      100 * share, 100 * std::min(largest_loss, most_of_estimate * share), skin.name)};
+    }
   }
   return std::nullopt;
 }
 
 }  // namespace
 
-std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors) {
+std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors,
+                                      const std::vector<double>& roughness) {
   constexpr double notable = 0.05, large = 0.2;
   // Of beams and blocks that are one to ten tetrahedra thick, of any Poisson's ratio.
   constexpr double most_of_estimate = 2.2, largest_loss = 0.95;
-  if (errors.size() != model.solids.size()) {
-    throw InputError(fmt::format("{} errors for {} solids", errors.size(), model.solids.size()));
+  if (errors.size() != model.solids.size() || roughness.size() != model.shells.size()) {
+    throw InputError(fmt::format("{} errors for {} solids, {} shares for {} shells", errors.size(), model.solids.size(),
+                                 roughness.size(), model.shells.size()));
   }
   std::vector<Warning> found;
   for (std::size_t s = 0; s < errors.size(); ++s) {
-    if (auto skin = doubt_of_coarse_skin(model, s)) {
+    if (auto skin = doubt_of_skin(model, s, roughness)) {
       found.push_back(*std::move(skin));  // what the jumps of stress say, too, is of its dents
     } else if (const double error = errors[s]; error > notable) {
       const SolidBody& body = model.solids[s];
@@ -647,13 +679,16 @@ std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<doub
 std::vector<Warning> doubts_of_layers(const Model& model, const std::vector<double>& errors) {
   constexpr double notable = 0.05, large = 0.2;
   const auto worst = std::ranges::max_element(errors);
-  if (worst == errors.end() || *worst < notable) {
+  const bool on_solid = std::ranges::any_of(model.attachments, [&](const Attachment& attachment) {
+    return !model.is_solid(attachment.body) && model.is_solid(attachment.to);
+  });
+  if (worst == errors.end() || *worst < notable || on_solid) {  // jumps of shells on faces are of what these do
     return {};
   }
   const ShellBody& body = model.shells[narrow<std::size_t>(worst - errors.begin())];
   return {{*worst > large ? Weight::major : Weight::minor, "coarse layers",
            fmt::format("{}: the shells of layers that are attached to each other are coarse for how they bend: by the "
-                       "jumps of membrane force between them, the layers give way by up to about {:.0f} % too much; "
+                       "jumps of membrane force between them, the layers give way by some {:.0f} % too much; "
                        "take finer meshes: half the size leaves a quarter of that",
                        named(body.said_at, body.name), 100 * *worst)}};
 }

@@ -25,9 +25,10 @@ bool is_loaded(const Model& model);
 std::vector<Warning> doubts(const Model& model, const RunSettings& settings, bool has_estimates = false);
 
 /// Solids whose tetrahedra are coarse for what they bear, or finer than a skin that they carry.
-/// @param errors  ElementFields::solid_error of the state
-/// Errors: InputError: not one per solid. Cost: linear.
-std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors);
+/// @param errors, roughness  ElementFields::solid_error and roughness of the state
+/// Errors: InputError: not one per solid, or shell. Cost: linear.
+std::vector<Warning> doubts_of_solids(const Model& model, const std::vector<double>& errors,
+                                      const std::vector<double>& roughness);
 
 /// What doubts that layers of shells are fine enough for what they bear, at most one.
 /// @param errors  ElementFields::layer_error of the state

@@ -5,6 +5,7 @@
 #include "tunica/mechanics/elements/rotation.hpp"
 #include "tunica/mechanics/model/wall.hpp"
 #include "tunica/mechanics/runs/curved_displacement.hpp"
+#include "tunica/mechanics/runs/detail/layers.hpp"
 #include "tunica/mechanics/runs/detail/loads.hpp"
 #include "tunica/mechanics/runs/detail/prestress.hpp"
 #include "tunica/mechanics/runs/detail/recovery.hpp"
@@ -45,6 +46,7 @@ std::vector<double> solid_errors(const ShellSystem& system, const std::vector<Ma
     }
   }
   std::vector<std::array<double, 2>> energies(model.solids.size(), {0, 0});  // of the stress, of the differences
+  std::vector<double> of_strain(model.solids.size(), 0);                     // of a strain of one
   for (std::size_t e = 0; e < stresses.size(); ++e) {
     const SolidElement& element = system.solids[e];
     const double bulk = element.bulk_of_displacement + element.bulk_of_pressure;
@@ -61,75 +63,16 @@ std::vector<double> solid_errors(const ShellSystem& system, const std::vector<Ma
     }
     auto& [whole, jumps] = energies[element.body - model.shells.size()];
     whole += energy(stresses[e], stresses[e]);
+    of_strain[element.body - model.shells.size()] += element.volume * element.shear;
     jumps += energy(sum, sum) / 20;  // the mass matrix of linear functions has 1 / 10 and 1 / 20
     for (const Mat3& at_corner : off) {
       jumps += energy(at_corner, at_corner) / 20;
     }
   }
   std::vector<double> errors;
-  for (const auto& [whole, jumps] : energies) {
-    errors.push_back(whole + jumps > 0 ? jumps / (whole + jumps) : 0);
-  }
-  return errors;
-}
-
-/// Of shells that are welded upon each other by whole triangles: what part of the bending stiffness of both layers each
-/// has of its own, without the other's distance. Of others zero.
-std::vector<double> own_shares_of_layers(const ShellSystem& system) {
-  const Model& model = *system.model;
-  std::vector<const Carried*> by_node(system.node_count(), nullptr);
-  for (const Carried& c : system.carried) {
-    by_node[c.node] = c.turns ? &c : nullptr;
-  }
-  std::vector<double> shares(system.elements.size(), 0);
-  const auto weld = [&](std::size_t e, const Carried& c) {
-    const ShellElement &one = system.elements[e], &other = system.elements[c.face];  // of the surfaces, shells first
-    const auto stretching = [&](const ShellElement& of) { return model.shells[of.body].material.young * of.thickness; };
-    const double own =
-        stretching(one) * one.thickness * one.thickness + stretching(other) * other.thickness * other.thickness;
-    const double together = stretching(one) * stretching(other) / (stretching(one) + stretching(other));
-    const double share = own / (own + 12 * together * c.offset.squaredNorm());
-    for (const std::size_t shell : {e, c.face}) {
-      shares[shell] = shares[shell] > 0 ? std::min(shares[shell], share) : share;
-    }
-  };
-  for (std::size_t e = 0; e < system.elements.size(); ++e) {
-    const auto& nodes = system.elements[e].nodes;
-    if (std::ranges::all_of(nodes, [&](Index node) { return by_node[node] != nullptr; })) {
-      std::ranges::for_each(nodes, [&](Index node) { weld(e, *by_node[node]); });
-    }
-  }
-  return shares;
-}
-
-/// Of ElementFields::layer_error. @param corners  recovered from `shells`
-std::vector<double> layer_errors(const ShellSystem& system, const std::vector<TensorPair>& shells,
-                                 const std::vector<std::array<TensorPair, 3>>& corners) {
-  const Model& model = *system.model;
-  const std::vector<double> own_share = own_shares_of_layers(system);
-  std::vector<std::array<double, 2>> energies(model.shells.size(), {0, 0});  // of all, of the differences
-  for (std::size_t e = 0; e < shells.size(); ++e) {
-    if (own_share[e] == 0) {
-      continue;
-    }
-    const ShellElement& element = system.elements[e];
-    const Mat3 compliance =
-        element.area / element.thickness * plane_stress(model.shells[element.body].material).inverse();
-    const auto energy = [&](const Vec3& force) { return force.dot(compliance * force); };
-    auto& [whole, jumps] = energies[element.body];
-    whole += energy(shells[e].force) + 12 / (element.thickness * element.thickness) * energy(shells[e].moment);
-    double off_energy = 0;
-    Vec3 sum = Vec3::Zero();
-    for (const TensorPair& corner : corners[e]) {
-      const Vec3 off = corner.force - shells[e].force;
-      off_energy += energy(off) / 12;  // the mass matrix of linear functions has 1 / 6 and 1 / 12
-      sum += off;
-    }
-    jumps += (off_energy + energy(sum) / 12) / own_share[e];
-  }
-  std::vector<double> errors;
-  for (const auto& [whole, jumps] : energies) {
-    errors.push_back(whole > 0 ? jumps / whole : 0);
+  for (std::size_t s = 0; s < energies.size(); ++s) {
+    const auto [whole, jumps] = energies[s];
+    errors.push_back(whole > of_strain[s] * least_strain * least_strain ? jumps / (whole + jumps) : 0);
   }
   return errors;
 }
@@ -366,6 +309,18 @@ void ElementFieldEvaluator::Implementation::add_shells(const State& state, Eleme
   const auto strained_corners = recovery.at_corners(strained);
   const auto stressed_corners = system.prestress_residual ? recovery.at_corners(stressed) : strained_corners;
   fields.layer_error = layer_errors(system, strained, strained_corners);
+  fields.roughness.assign(model.shells.size(), 0);
+  double round_off = 0;
+  for (std::size_t e = 0; e < strained.size(); ++e) {
+    const ShellElement& element = system.elements[e];
+    const Material& material = model.shells[element.body].material;
+    const ShellEnergy energy = shell_energy(element, material, strained[e], strained_corners[e]);
+    fields.roughness[element.body] += energy.force_jumps + energy.moment_jumps;
+    round_off += element.area * element.thickness * material.young * least_strain * least_strain;
+  }
+  for (double& roughness : fields.roughness) {
+    roughness = state.strain_energy > round_off ? roughness / state.strain_energy : 0;
+  }
   CornerFields corners;
   std::vector<double> weight(model.node_count(), 0);
   double whole = 0, far_area = 0;

@@ -71,9 +71,11 @@ struct ElementFields {
   /// practical engineering analysis".
   std::vector<double> solid_error;
   /// #shells: by what part layers that are welded upon each other give way too much, about. A shell stretches by one
-  /// number per triangle where, off the middle of both layers, it should by a linear function: the jumps of the
-  /// membrane force, as above, over the part of the layers' bending stiffness that each has of its own.
+  /// number per triangle where, off the middle of all layers, it should by a linear function: the jumps of the membrane
+  /// forces, as above, over the part of their bending stiffness that the layers have of their own.
   std::vector<double> layer_error;
+  /// #shells: the energy of the jumps of forces and moments, as above, over the strain energy of all bodies.
+  std::vector<double> roughness;
 };
 
 /// Forces, moments and stresses of every triangle in one state, and what is largest. For many states of one model: the

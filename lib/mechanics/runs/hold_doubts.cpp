@@ -81,6 +81,9 @@ std::vector<char> touched_nodes(const Model& model, std::size_t body) {
     }
   }
   for (const Attachment& attachment : model.attachments) {
+    if (!model.is_solid(attachment.to) && attachment.nodes.size() == model.vertices_of(attachment.body).size()) {
+      continue;  // a layer, which ends where what carries it ends
+    }
     if (attachment.body == body) {
       mark(attachment.nodes);
     } else if (attachment.to == body) {

@@ -10,6 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <regex>
+
 namespace tunica {
 namespace {
 
@@ -173,33 +175,52 @@ TEST(Carried, ASolidOnAShellFollowsItsRigidMotion) {
             1e-8);
 }
 
-/// A strip of 40 by 8 mm, E = 1 MPa, of two layers of 1 mm, clamped at one end: its deflection, in that of a strip of 2
-/// mm, under a moment at the end of the lower one.
-double layered_strip(std::size_t lower, std::size_t upper, bool linear) {
-  constexpr double length = 40, moment = 4e-3, stiffness = 8 * 8 / 12.0;
+/// A strip of 40 by 8 mm, E = 1 MPa, of two layers of 1 mm, or of one of 2 mm (`upper` = 0), clamped at one end.
+/// @return how a node of the other end of the lower one moves under a moment there
+Vec3 moved_strip(std::size_t lower, std::size_t upper, const Vec3& moment, const Vec3& at, bool linear = true) {
   Model model;
-  const auto strip = [&](std::size_t n, double z) {
-    return flat_body(make_grid(n, n / 5, [&](double u, double v) { return Vec3(length * u, 8 * v, z); }).mesh, 1, 0, 1);
+  const auto strip = [&](std::size_t n, double z, double thickness) {
+    return flat_body(make_grid(n, n / 5, [&](double u, double v) { return Vec3(40 * u, 8 * v, z); }).mesh, 1, 0,
+                     thickness);
   };
-  model.shells = {strip(lower, 0), strip(upper, 1)};
-  model.attachments.push_back(all_nodes_of(model, 1, 0));
+  model.shells = {strip(lower, 0, upper > 0 ? 1 : 2)};
+  if (upper > 0) {
+    model.shells.push_back(strip(upper, 1, 1));
+    model.attachments.push_back(all_nodes_of(model, 1, 0));
+  }
   hold(
       model, [](const Vec3& x) { return x.x() < eps; }, "xyz", "xyz");
   MomentLoad load;
-  load.nodes = nodes_of(model, 0, [&](const Vec3& x) { return x.x() > length - eps; });
-  load.total = Vec3(0, -moment, 0);
+  load.nodes = nodes_of(model, 0, [&](const Vec3& x) { return x.x() > 40 - eps; });
+  load.total = moment;
   model.loads.push_back({0, load, {}});
   const State state = last_state(model, linear ? linear_run() : nonlinear_run({1}));
-  return state.displacement[load.nodes[load.nodes.size() / 2]].z() / (moment * length * length / 2 / stiffness);
+  return state.displacement[nearest(model.shells[0].mesh, at)];
 }
 
 /// Whatever the meshes: what is carried bends between the nodes of what carries it as that does.
 TEST(Carried, LayersThatAreWeldedBendAsOne) {
+  const auto deflection = [](std::size_t lower, std::size_t upper, bool linear) {
+    constexpr double exact = 4e-3 * 40 * 40 / 2 / (8 * 8 / 12.0);
+    return moved_strip(lower, upper, Vec3(0, -4e-3, 0), Vec3(40, 4, 0), linear).z() / exact;
+  };
   for (const auto& [lower, upper] :
        {std::pair<std::size_t, std::size_t>{10, 10}, {10, 20}, {10, 40}, {20, 30}, {20, 33}, {40, 20}}) {
-    EXPECT_NEAR(layered_strip(lower, upper, true), 1, 2e-3) << lower << " " << upper;
+    EXPECT_NEAR(deflection(lower, upper, true), 1, 2e-3) << lower << " " << upper;
   }
-  EXPECT_NEAR(layered_strip(20, 40, false), 1, 2e-3);
+  EXPECT_NEAR(deflection(20, 40, false), 1, 2e-3);
+}
+
+/// What a skin's shear puts on a free edge turns the edge's nodes, in a band as wide as its shells.
+TEST(Carried, ATwistedStripOfLayersGivesWayByItsFreeEdges) {
+  const auto too_much = [](std::size_t n) {
+    const Vec3 moment(4e-3, 0, 0), corner(40, 8, 0);
+    return moved_strip(n, n, moment, corner).z() / moved_strip(n, 0, moment, corner).z() - 1;
+  };
+  const double coarse = too_much(20), middle = too_much(40), fine = too_much(80);
+  EXPECT_LT(coarse, 0.1);
+  EXPECT_GT(coarse / middle, 1.7);
+  EXPECT_GT(middle / fine, 1.6);
 }
 
 /// A tube of 20 mm, E = 1 MPa, pinched along two lines: its deflection in two layers of 0.5 mm, and by how much that is
@@ -287,6 +308,63 @@ TEST(Carried, AJointAlongALineBearsBending) {
       const Vec3 exact = upright ? Vec3(-600 * curvature, 0, 200 * curvature) : Vec3(0, 0, 800 * curvature);
       EXPECT_LT((moved - exact).norm(), 2e-3 * exact.norm()) << upright << " " << across;
     }
+  }
+}
+
+/// An upright strip on the middle of one of 80 mm, clamped at both ends, whose shells it divides: under a moment M the
+/// joint turns by M L / (16 E I), but for what bends within the shell, some 1.5 h / L of that.
+TEST(Carried, AJointWithinAShellMissesItsOwnBending) {
+  for (const std::size_t n : {15, 31}) {
+    Model model;
+    const Grid base = make_grid(n, 4, [](double u, double v) { return Vec3(80 * u, 8 * v, 0); });
+    const Grid upright = make_grid(4, 4, [](double u, double v) { return Vec3(40, 8 * u, 10 * v); });
+    model.shells = {flat_body(base.mesh, 1, 0, 0.5), flat_body(upright.mesh, 1, 0, 0.5)};
+    Attachment joint;
+    joint.body = 1;
+    joint.to = 0;
+    joint.nodes = nodes_of(model, 1, [](const Vec3& x) { return x.z() < eps; });
+    model.attachments.push_back(joint);
+    hold(
+        model, [](const Vec3& x) { return x.x() < eps || x.x() > 80 - eps; }, "xyz", "xyz");
+    MomentLoad load;
+    load.nodes = nodes_of(model, 1, [](const Vec3& x) { return x.z() > 10 - eps; });
+    load.total = Vec3(0, 2e-5, 0);
+    model.loads.push_back({1, load, {}});
+    const State state = last_state(model, linear_run());
+    const double turned = state.rotation[model.first_node(1) + joint.nodes[2]].y();
+    const double missing = 1 - turned / (2e-5 * 80 / (16 * 8 * 0.125 / 12));
+    EXPECT_GT(missing, 0);
+    EXPECT_LT(missing, 1.8 / static_cast<double>(n));
+  }
+}
+
+/// A ring of a soft core between two stiff skins, pinched: it gives way by 0.1488 P R^3 / (E I), and about what is
+/// said.
+TEST(Carried, ASandwichSaysHowFarItIs) {
+  Model model;
+  double stiffness = 0;
+  for (const auto& [radius, thickness, young] : {std::array<double, 3>{9.6, 0.2, 5}, {10, 0.6, 0.2}, {10.4, 0.2, 5}}) {
+    ShellBody body = flat_body(tube_mesh(radius, radius, 2, 40, 2), young, 0, thickness);
+    body.curved = true;
+    body.rest = Rest::curved;
+    model.shells.push_back(body);
+    const double off = radius - 10;
+    stiffness += 2 * young * thickness * (thickness * thickness / 12 + off * off);
+  }
+  model.attachments = {all_nodes_of(model, 1, 0), all_nodes_of(model, 2, 1)};
+  model.rigid_motions.push_back({0});
+  ForceLoad load;
+  for (const double side : {-1.0, 1.0}) {
+    load.nodes = nodes_of(model, 0, [&](const Vec3& x) { return side * x.x() > 9.6 - eps; });
+    load.total = Vec3(side * 1e-3, 0, 0);
+    model.loads.push_back({0, load, {}});
+  }
+  const State state = last_state(model, linear_run());
+  const double off = 2 * state.displacement[load.nodes[0]].x() / (0.1488 * 1e-3 * 1000 / stiffness) - 1;
+  EXPECT_GT(off, 0.15);
+  for (const double said : element_fields(model, state).layer_error) {
+    EXPECT_GT(said, 0.6 * off);
+    EXPECT_LT(said, 2 * off);
   }
 }
 
@@ -512,11 +590,54 @@ TEST(Carried, OfFacesThatCrossTheFinerOneShouldBeCarried) {
 
 TEST(Carried, ASkinThatIsCoarserThanItsSolidIsDoubted) {
   Model model = shell_on_solid();
-  EXPECT_THAT(doubts_of_solids(model, {0}), testing::IsEmpty());
+  EXPECT_THAT(doubts_of_solids(model, {0}, {0}), testing::IsEmpty());
   model.solids[0].mesh = box(9, 9, 4, Vec3(-2, -2, -1), Vec3(2, 2, 1));
-  const std::vector<Warning> found = doubts_of_solids(model, {0.1});
+  const std::vector<Warning> found = doubts_of_solids(model, {0.1}, {0});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].kind, "coarse skin");
+}
+
+/// A skin of 1 mm and 10 MPa on a core of 0.1 MPa, as a cantilever: carried by the core it is too stiff where it is the
+/// finer one, which is said; carrying the core it is right whatever the meshes.
+TEST(Carried, ASkinThatIsFinerThanItsSolidIsDoubtedAndServesTheOtherWayRound) {
+  const auto deflection = [](std::size_t n, bool skin_carries, std::vector<Warning>& found) {
+    Model model;
+    const Grid grid = make_grid(n, n / 5, [](double u, double v) { return Vec3(40 * u, 8 * v, 4.5); });
+    model.shells.push_back(flat_body(grid.mesh, 10, 0, 1));
+    model.solids.push_back(
+        {"core", box(40, 8, 4, Vec3(0, 0, 0), Vec3(40, 8, 4)), {0.1, 0, {}}, SolidLaw::corotational});
+    Attachment joint = all_nodes_of(model, 0, 1);
+    if (skin_carries) {
+      joint.body = 1;
+      joint.to = 0;
+      joint.nodes = nodes_of(model, 1, [](const Vec3& x) { return x.z() > 4 - eps; });
+      hold(
+          model, [](const Vec3& x) { return x.x() < 6 + eps; }, "xyz", "xyz");
+    }
+    model.attachments.push_back(joint);
+    hold_nodes(
+        model, 1, [&](const Vec3& x) { return x.x() < 6 + eps && (!skin_carries || x.z() < 4 - eps); }, "xyz");
+    ForceLoad load;
+    load.nodes = nodes_of(model, 1, [&](const Vec3& x) { return x.x() > 40 - eps && x.z() < eps; });
+    load.total = Vec3(0, 0, -2e-5);
+    model.loads.push_back({1, load, {}});
+    const State state = last_state(model, linear_run());
+    const ElementFields fields = element_fields(model, state);
+    found = doubts_of_solids(model, fields.solid_error, fields.roughness);
+    return state.displacement[model.first_node(1) + load.nodes[0]].z();
+  };
+  std::vector<Warning> found;
+  const double right = deflection(40, true, found);
+  EXPECT_NEAR(deflection(80, true, found) / right, 1, 0.02);
+  EXPECT_NEAR(deflection(40, false, found) / right, 1, 0.05);
+  const double lost = 1 - deflection(80, false, found) / right;
+  EXPECT_GT(lost, 0.3);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].kind, "fine skin");
+  std::smatch said;
+  ASSERT_TRUE(std::regex_search(found[0].text, said, std::regex("by (\\d+) to (\\d+) % too little")));
+  EXPECT_LT(std::stod(said[1]) / 100, lost);
+  EXPECT_GT(std::stod(said[2]) / 100, lost);
 }
 
 TEST(Carried, ANodeCarriedTwiceIsNamed) {

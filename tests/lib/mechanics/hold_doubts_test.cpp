@@ -84,6 +84,18 @@ TEST(HoldDoubts, AnEndWhereNoPressureActsLacksNothing) {
   EXPECT_THAT(found[0].text, HasSubstr("3.11 N"));
 }
 
+TEST(HoldDoubts, ASecondLayerHoldsNoEnd) {
+  Model model = tube(10, 40, 1, 0.01);
+  model.shells.push_back(tube(11, 40, 1, 0.01).shells[0]);
+  Attachment layer;
+  layer.body = 1;
+  for (Index i = 0; i < model.shells[1].mesh.vertices.size(); ++i) {
+    layer.nodes.push_back(i);
+  }
+  model.attachments.push_back(layer);
+  EXPECT_THAT(kinds(doubts_of_ends(model)), ElementsAre("free end"));
+}
+
 /// Two halves of a vessel, one tied to the rim of the other, whose shells lie half of one farther around.
 TEST(HoldDoubts, AHalfThatCarriesTheOtherIsNoFreeEndAndItsSeamNoCrossing) {
   Model model = tube(10, 20, 1, 0.01);

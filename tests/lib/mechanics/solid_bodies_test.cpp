@@ -105,11 +105,11 @@ TEST(SolidBody, AConstantStressHasNoError) {
   const Model model = pulled_cube(SolidLaw::neo_hookean, 0.3);
   const ElementFields fields = element_fields(model, last_state(model, nonlinear_run({1})));
   EXPECT_LT(fields.solid_error.at(0), 1e-12);
-  EXPECT_THAT(doubts_of_solids(model, fields.solid_error), ::testing::IsEmpty());
-  const std::vector<Warning> coarse = doubts_of_solids(model, {0.3});
+  EXPECT_THAT(doubts_of_solids(model, fields.solid_error, {}), ::testing::IsEmpty());
+  const std::vector<Warning> coarse = doubts_of_solids(model, {0.3}, {});
   ASSERT_EQ(coarse.size(), 1U);
   EXPECT_THAT(coarse[0].text, ::testing::HasSubstr("30 to 66 % too little"));
-  EXPECT_THROW(doubts_of_solids(model, {}), InputError);
+  EXPECT_THROW(doubts_of_solids(model, {}, {}), InputError);
 }
 
 /// Deflections of less than 1 % of the length: all laws say the same.

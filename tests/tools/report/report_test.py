@@ -564,7 +564,8 @@ class CohortPage(ReportTest):
         with open(summary, newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
         self.assertEqual(list(rows[0]), ["case", "stage", "exit", "message", "shells", "distance_percent", "membrane_p99_kpa",
-                                         "membrane_error_percent", "stress_p99_kpa", "stress_error_percent", "max_displacement_mm", "displacement_error_percent",
+                                         "membrane_error_percent", "membrane_mean_kpa", "stress_p99_kpa", "stress_error_percent",
+                                         "max_displacement_mm", "displacement_error_percent",
                                          "strain_p99_percent", "warnings", "seconds"])
         self.assertEqual([(row["stress_p99_kpa"], row["stress_error_percent"], row["warnings"]) for row in rows],
                          [("20", "", "0"), ("20.1", "", "0")])

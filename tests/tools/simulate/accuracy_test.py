@@ -101,6 +101,14 @@ where = {above = {axis = "z", at = "2mm"}}
         self.assertIsNone(claim["levels"][0]["mean_distance_mm"])
         self.assertIn("ball.ply: has no target", self.done.stderr)
 
+    def test_an_aim_does_without_a_target_that_is_no_finer(self):
+        report = self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "ball.ply", "--max-seconds", "60s")
+        self.assertEqual(report["warning_kinds"], ["no target"])
+        self.assertIn("the error of the geometry is not seen", report["warnings"][0])
+        self.assertIn("geometry", report["result"]["accuracy"]["not_included"])
+        self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "ball.ply", "--force", code=3,
+                      says="take fewer shells (SHELLS=40)")
+
     def test_the_choice_does_not_depend_on_threads(self):
         claims = [self.run_tool("ball.ply", "out.hdf", *HELD, "--accuracy", "2%", "--target", "target.ply", "--force",
                                 "--threads", threads)["result"]["accuracy"] for threads in ("1", "2", "2")]

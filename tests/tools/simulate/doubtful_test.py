@@ -39,6 +39,18 @@ class Doubtful(SimulateTest):
         for young in ("1kPa", "100MPa", "2GPa"):
             self.assertEqual(told(young=young, density="1.05g/cm3", pressure="0.1Pa"), [])
 
+    def test_units_that_no_organ_of_an_image_has(self):
+        vertices, triangles, normals = sphere(2, 10)
+        write_ply(self.path("organ.ply"), vertices, triangles, normals, comments=["units mm", "voxel 0.5 0.5 0.8"])
+
+        def told(**given):
+            return self.warned("organ.ply", *words(**given), *HELD)[0]
+
+        self.assertIn("its Young's modulus, 3 GPa, is more than that of any hollow organ: was 3 MPa or 3 kPa meant?",
+                      told(young="3GPa"))
+        self.assertIn("its thickness, 0.0015 mm, is less than a hundredth of the voxels of its image, 0.5 mm: was 1.5 mm meant?",
+                      told(thickness="1.5um", pressure="1Pa"))
+
     def test_regions_smaller_than_the_shells(self):
         vertices, triangles = grid(8, 8, 20, 20)
         write_ply(self.path("plate.ply"), vertices, triangles)
@@ -71,6 +83,18 @@ class Doubtful(SimulateTest):
                        fix(np.flatnonzero(vertices[:, 0] > 19.9), "z", "") +
                        '[[attach]]\nbody = "s"\nwhere = {below = {axis = "x", at = "4mm"}}\nto = "b"\n')
             self.assertEqual("the joint is a hinge" in " ".join(self.warned("--scene", "ends.toml")), hinged)
+
+    def test_a_joint_within_shells_is_noted(self):
+        vertices, triangles = grid(10, 4, 20, 8)
+        write_ply(self.path("base.ply"), vertices, triangles)
+        for at, noted in ((10, False), (11, True)):
+            write_ply(self.path("upright.ply"), vertices[:, [2, 1, 0]] + np.array([at, 0, 0]), triangles)
+            upright = shell("upright.ply", 1, 1000, 0.3).replace('"s"', '"t"')
+            self.write("joint.toml", run_lines(kind="static") + shell("base.ply", 1, 1000, 0.3) + load("pressure", "1Pa") +
+                       fix(np.flatnonzero(vertices[:, 0] < 0.1)) + upright +
+                       '[[attach]]\nbody = "t"\nwhere = {below = {axis = "z", at = "0mm"}}\nto = "s"\n')
+            told = self.run_tool("--scene", "joint.toml", "out.hdf", "--force")["notes"]
+            self.assertEqual("within shells of s" in " ".join(told), noted, told)
 
     def test_a_patch_in_a_hole_is_as_the_sheet_without_it(self):
         vertices, triangles = grid(20, 20, 20, 20)
